@@ -24,7 +24,7 @@ from math import hypot
 
 import msgspec
 
-from conformance.grading.called import MeasuredStep, Question, ask, fail, measured, numbers, scales
+from conformance.grading.called import MeasuredStep, Question, ask, fail, measure_step, numbers, scales
 from scene import (
     Collision,
     Horizon,
@@ -63,9 +63,9 @@ def check_mirror(
     Returns:
         Whether there was something to compare.
     """
-    given, image = (scene, state, t_end), (scene, transforms.mirrored(state), t_end)
-    expected = _changed(ask(stepper, *given), (1, 1, -1, 1, -1, 1), transforms.mirrored_wall)
-    return _compare("mirror in x", stepper, given, image, ask(stepper, *image), expected, is_exact, bound)
+    question, image = (scene, state, t_end), (scene, transforms.mirrored(state), t_end)
+    expected = _changed(ask(stepper, *question), (1, 1, -1, 1, -1, 1), transforms.mirrored_wall)
+    return _compare("mirror in x", stepper, question, image, ask(stepper, *image), expected, is_exact, bound)
 
 
 def check_scaling(
@@ -102,9 +102,9 @@ def check_static_limit(
     Exact to the bit if the value of a law is its mean plus a sum of zeros. See `check_mirror`.
     """
     still = transforms.frozen(scene, state.t)
-    given, idle = (still, state, t_end), (transforms.idle(still), state, t_end)
-    answer = ask(stepper, *given)
-    return _compare("static limit", stepper, given, idle, ask(stepper, *idle), answer, is_exact, bound)
+    question, idle = (still, state, t_end), (transforms.idle(still), state, t_end)
+    answer = ask(stepper, *question)
+    return _compare("static limit", stepper, question, idle, ask(stepper, *idle), answer, is_exact, bound)
 
 
 def check_period_shift(
@@ -138,26 +138,26 @@ def check_period_shift(
         found = msgspec.structs.replace(found, t=answer.t)
     is_exact = is_exact and rounding == 0.0
     incoming = (rounding + bound * abs(later), 0.0, 0.0, 0.0, 0.0)
-    given, image = (scene, state, t_end), (scene, late, end)
-    return _compare("period shift", stepper, given, image, found, answer, is_exact, bound, incoming)
+    question, image = (scene, state, t_end), (scene, late, end)
+    return _compare("period shift", stepper, question, image, found, answer, is_exact, bound, incoming)
 
 
 def check_split_flight(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
     """Check that a flight, or a flow, that is stopped halfway and continued ends like the whole one."""
-    given = scene, state, t_end
-    whole = measured(stepper, *given, bound)
+    question = scene, state, t_end
+    whole = measure_step(stepper, *question, bound)
     if whole is None:
         return False
     middle = state.t + whole.numbers[0] / 2
-    half = measured(stepper, scene, state, middle, bound)
+    half = measure_step(stepper, scene, state, middle, bound)
     if half is None or middle == state.t:
         return False
     if not isinstance(half.outcome, Horizon):
-        fail("split flight", f"{half.outcome} before half of the flight", given, (scene, state, middle))
-    asked = given, (scene, state, middle), (scene, half.state(), t_end)
-    rest = measured(stepper, *asked[-1], bound, half.errors[1:])
+        fail("split flight", f"{half.outcome} before half of the flight", question, (scene, state, middle))
+    asked = question, (scene, state, middle), (scene, half.state(), t_end)
+    rest = measure_step(stepper, *asked[-1], bound, half.errors[1:])
     if rest is None:
         return False
     if getattr(rest.outcome, "wall", None) != getattr(whole.outcome, "wall", None):
@@ -176,34 +176,34 @@ def check_reversal(
     The path goes from the state over its collision to half of the next flight, then back to half of the
     first. Permitted errors are carried through every step. See `check_mirror`.
     """
-    given = scene, state, t_end
-    there = measured(stepper, *given, bound)
+    question = scene, state, t_end
+    there = measure_step(stepper, *question, bound)
     if there is None:
         return False
     onward: MeasuredStep | None = there
     walls: list[str | None] = [None]
-    begin, asked = state, [given]
+    begin, asked = state, [question]
     if isinstance(there.outcome, Collision):
         led = scene, there.state(), max(t_end, there.outcome.t)
         if isinstance(refusal := ask(stepper, *led), Rejected):
-            fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", given, led)
+            fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", question, led)
         way = _across_bounce(stepper, scene, state, t_end)
         if way is None:
             return False
         begin, hit, end = way
         walls = [hit.wall, None]
         asked.append((scene, there.state(), end))
-        onward = measured(stepper, *asked[-1], bound, there.errors[1:])
+        onward = measure_step(stepper, *asked[-1], bound, there.errors[1:])
     if onward is None or not isinstance(onward.outcome, Horizon) or not onward.outcome.t > begin.t:
         return False
     at, errors, film = onward.state(), onward.errors, transforms.backwards(scene)
     at = State(-at.t, at.x, at.y, -at.vx, -at.vy)
     for wall in walls:  # and last the horizon
         asked.append((film, at, -begin.t))
-        back = measured(stepper, *asked[-1], bound, errors[1:])
+        back = measure_step(stepper, *asked[-1], bound, errors[1:])
         met = None if back is None else getattr(back.outcome, "wall", None)
         if back is not None and wall and met != wall:
-            fail("time reversal", f"{wall} there, {back.outcome} on the way back", given, asked[-1])
+            fail("time reversal", f"{wall} there, {back.outcome} on the way back", question, asked[-1])
         if back is None or met != wall:
             return False
         at, errors = back.state(), back.errors
@@ -219,7 +219,7 @@ def check_angular_momentum(
 
     At the base, which is at rest, it changes sign. Other walls are not compared.
     """
-    step = measured(stepper, scene, state, t_end, bound)
+    step = measure_step(stepper, scene, state, t_end, bound)
     if step is None or not isinstance(step.outcome, Collision) or step.outcome.wall not in ("arc", "base"):
         return False
     _, _, x, y, vx, vy = step.numbers
@@ -346,7 +346,7 @@ def _changed(
 def _compare(
     name: str,
     stepper: Stepper,
-    given: Question,
+    question: Question,
     image: Question,
     answer: Outcome,
     expected: Outcome,
@@ -355,23 +355,23 @@ def _compare(
     incoming: Sequence[float] = (0.0,) * 5,
 ) -> bool:
     """Compare two outcomes that must be the same, bit for bit or within rounding."""
-    state = given[1]
+    state = question[1]
     if isinstance(answer, Undecided) or isinstance(expected, Undecided):
         return False
     is_same_kind = type(answer) is type(expected)
     is_same = is_same_kind and getattr(answer, "wall", None) == getattr(expected, "wall", None)
     allowed: Sequence[float] = (0.0,) * 6
     if not is_exact:
-        step = measured(stepper, *given, bound, incoming)
+        step = measure_step(stepper, *question, bound, incoming)
         if step is None:
             return False
         allowed = [2 * error for error in step.errors]
     if not is_same:
-        fail(name, f"{answer}, must be {expected}", given, image)
+        fail(name, f"{answer}, must be {expected}", question, image)
     found, wanted = numbers(answer, state), numbers(expected, state)
     if found is None or wanted is None:
         return False
-    _near(name, found, wanted, allowed, given, image)
+    _near(name, found, wanted, allowed, question, image)
     return True
 
 

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from conformance import plain
 from conformance.cases import scenes as scene_draws
-from conformance.cases.draw import Draw, Unfit
-from conformance.cases.question import Question
+from conformance.cases.draw import Draw, Question, Unfit
 from conformance.cases.scenes import Clock, any_law, any_scene, start, when
 from conformance.cases.table import FAMILIES
 from scene import BadInput, Horizon, Law, Scene, State, from_data, to_data

@@ -15,10 +15,10 @@ from conformance.cases.generated import fresh_one
 from conformance.grading.agreement import middle
 from conformance.suite import Result, ask_vector
 from conformance.suite.answers import outcomes_of
-from conformance.suite.disguise import Disguise, asked, drawn_disguise, drawn_horizons
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from conformance.suite.run import N_FRESH
 from conformance.suite.session import Session
+from conformance.suite.symmetry import Transform, draw_transform
 from conformance.vectors import Vector
 from mushrooms.check import format_outcome
 from mushrooms.terminal import new_console
@@ -46,12 +46,12 @@ def ask(
     Exit code 0; 1 if the stepper does not pass; 2 on bad input.
     """
     vector = _find(case, seed)
-    disguise = Disguise() if seed is None else drawn_disguise(vector, seed)
-    result = _put(command, vector, disguise) if command else None
+    transform = Transform() if seed is None else draw_transform(vector, seed)
+    result = _put(command, vector, transform) if command else None
     if as_json:
         print(msgspec.json.format(msgspec.json.encode(vector), indent=1).decode())
     else:
-        _show(vector, disguise)
+        _show(vector, transform)
     if result is None:
         return 0
     if result.answer is not None:
@@ -62,28 +62,26 @@ def ask(
 
 
 def _find(case: str, seed: int | None) -> Vector:
-    if seed is None and case.startswith(("drawn/", "fresh/")):
+    if seed is None and case.startswith("fresh/"):
         raise BadInput(f"ID = {case!r} is of one run's questions: give the run's --seed")
     known = vectors.load("stress")
     found = {vector.id: vector for vector in known}
-    if seed is not None:
-        if case in {f"fresh/{number}" for number in range(1, max(N_FRESH.values()) + 1)}:
-            return fresh_one(seed, int(case.removeprefix("fresh/")))
-        found |= {v.id: v for v in drawn_horizons([v for v in known if v.level == "core"], seed)}
+    if seed is not None and case in {f"fresh/{number}" for number in range(1, max(N_FRESH.values()) + 1)}:
+        return fresh_one(seed, int(case.removeprefix("fresh/")))
     if case in found:
         return found[case]
     raise BadInput(f"ID = {case!r}, must be a vector's, such as {known[0].id}")
 
 
-def _show(vector: Vector, disguise: Disguise) -> None:
+def _show(vector: Vector, transform: Transform) -> None:
     console = new_console(soft_wrap=True)
     condition = f", condition {vector.condition:.3g}" if vector.condition else ""
     console.print(f"[bold]{vector.id}[/], level {vector.level}{condition}")
     console.print(f"rule       {escape(vector.rule)}")
     console.print(f"source     {escape(vector.source)}")
-    if str(disguise) != str(type(disguise)()):
-        console.print(f"asked      {disguise}; certified answers below are of the question as published")
-    console.print(f"question   {escape(json.dumps(vectors.request(asked(vector, disguise), 0)))}")
+    if str(transform) != str(type(transform)()):
+        console.print(f"asked      {transform}; certified answers below are of the question as published")
+    console.print(f"question   {escape(json.dumps(vectors.request(transform.apply(vector), 0)))}")
     for i, expectation in enumerate(vector.expect):
         console.print(
             f"{'certified' if i == 0 else 'or'}  {expectation.outcome} {expectation.reason}".rstrip()
@@ -96,11 +94,11 @@ def _show(vector: Vector, disguise: Disguise) -> None:
     console.print(f"verifier   {verdict.status} {escape(verdict.reason)}".rstrip())
 
 
-def _put(command: list[str], vector: Vector, disguise: Disguise) -> Result:
+def _put(command: list[str], vector: Vector, transform: Transform) -> Result:
     with Session(command) as session:
         try:
             session.start()
             session.probe()
-        except Trouble as trouble:
-            raise BadInput(f"the command does not speak protocol 1: {trouble}") from None
-        return ask_vector(session, vector, disguise)
+        except CheckFailure as failure:
+            raise BadInput(f"the command does not speak protocol 1: {failure}") from None
+        return ask_vector(session, vector, transform)

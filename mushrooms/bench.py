@@ -20,7 +20,7 @@ from conformance.bench.solvers import Family, Solver, by_command
 from conformance.cases.prover import proved_step
 from conformance.files import Writer, write_files
 from conformance.harness.examples import find_examples
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
 from mushrooms import bench_solvers as ours
 from mushrooms import output
@@ -105,15 +105,13 @@ def _measure(size: Size, seed: int, command: list[str]) -> Record:
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
-            found, troubles = solvers.measure(workload, running, effort, tick)
+            found, failures = solvers.measure(workload, running, effort, tick)
             points += found
-            not_run |= {f"{name} on {rule.name}": why for name, why in troubles.items()}
+            not_run |= {f"{name} on {rule.name}": why for name, why in failures.items()}
             tick("")
         n_paths, length = PATHS[size]
         bar.reset(task, total=n_paths, description="error growth")
-        grown = growth.grow(
-            ours.our_followers(), proved_step, ours.linearise, ours.prove_path, seed, n_paths, length, tick
-        )
+        grown = growth.grow(ours.our_followers(), proved_step, ours.prove_path, seed, n_paths, length, tick)
     return record.Record(
         format=record.FORMAT,
         size=size,
@@ -141,8 +139,8 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
     try:
         library, built["lean C"] = baselines.build(folder, baselines.FLAGS)
         found += baselines.in_c(library)
-    except Trouble as trouble:
-        not_run["lean C, time steps"] = trouble.why
+    except CheckFailure as failure:
+        not_run["lean C, time steps"] = failure.why
 
     def add(name: str, family: Family, line: Sequence[str]) -> None:
         found.append(by_command(name, family, line, stack, limits))
@@ -155,16 +153,16 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
             continue
         try:
             add(name, "example", example.command)
-        except (Trouble, BadInput) as trouble:
-            not_run[name] = str(trouble)
+        except (CheckFailure, BadInput) as failure:
+            not_run[name] = str(failure)
             continue
         if example.built:
             built[name] = example.built
     if command:
         try:
             add(f"command {' '.join(command)}", "command", command)
-        except Trouble as trouble:
-            raise BadInput(f"command {command[0]!r} {trouble.verdict}: {trouble.why}") from None
+        except CheckFailure as failure:
+            raise BadInput(f"command {command[0]!r} {failure.verdict}: {failure.why}") from None
     return found, built, not_run
 
 

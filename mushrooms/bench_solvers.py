@@ -8,12 +8,12 @@ import time
 import fast
 import reference
 from conformance import plain
-from conformance.bench.growth import FAR, PathFollower, PathPoint
-from conformance.bench.solvers import Given, Solver, SolverRun, by_call
-from conformance.bench.workloads import WINDOW, Workload
-from conformance.cases import prover
+from conformance.bench.growth import FAR, PathFollower, PathPoint, Sensitivity
+from conformance.bench.solvers import Solver, SolverAnswer, SolverRun, by_call
+from conformance.bench.workloads import FLIGHTS, Workload
+from conformance.cases.certify import Links
+from conformance.cases.prover import collided
 from conformance.grading.agreement import Answer, Enclosed, exact
-from conformance.grading.error import Matrix
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from scene import Collision, Scene, State
 
@@ -25,16 +25,11 @@ LANES_SERVE = (
 )  # fmt: skip
 
 
-def linearise(scene: Scene, state: State, t_end: float) -> tuple[Collision, Matrix]:
-    """Return a proved collision, and its Jacobian."""
-    outcome = prover.ask(scene, state, t_end)
-    assert isinstance(outcome, reference.Collision)
-    return outcome.rounded(), prover.flight_of(outcome, state, t_end).jacobian
-
-
-def prove_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
-    """Follow a path by proof, right to twenty digits at its end."""
-    return _places(reference.trajectory(scene, state, n_collisions, digits=20))
+def prove_path(scene: Scene, state: State, n_collisions: int) -> tuple[list[PathPoint], list[Sensitivity]]:
+    """Follow a path by proof, right to twenty digits at its end, and chain the Jacobians of its steps."""
+    path, links = reference.trajectory(scene, state, n_collisions, digits=20), Links(scene, state, FAR)
+    chain = [Sensitivity(links.add(step), links.held[0]) for step in path.steps]
+    return _places(path), chain
 
 
 def our_solvers() -> list[Solver]:
@@ -63,7 +58,7 @@ def _proof(digits: int) -> Solver:
     def step(scene: Scene, state: State, t_end: float) -> Answer:
         found = reference.next_collision(scene, state, t_end, digits=digits)
         if isinstance(found, reference.Collision):
-            return Enclosed(found.wall, list(prover.collided(found).values()))
+            return Enclosed(found.wall, list(collided(found).values()))
         return found.rounded() if isinstance(found, reference.Horizon) else found
 
     return by_call(f"proof, {digits} digits", "proof", step)
@@ -76,7 +71,7 @@ def _careful(workload: Workload, n_times: int) -> SolverRun:
 
 def _fine(workload: Workload, n_times: int) -> SolverRun:
     paths, seconds = fine_steps(workload.scene, [q.state for q in workload.questions], n_times)
-    answers: list[Given] = []
+    answers: list[SolverAnswer] = []
     for path in paths:
         if path.outcome is None:
             dt, _, *place = path.numbers(0)
@@ -91,7 +86,7 @@ def _lanes(workload: Workload, n_times: int) -> SolverRun:
     states = [q.state for q in workload.questions]
     copies = -(-128 // len(states))  # enough to fill both pools
     followed = states[:1] if workload.length else states * copies
-    t_end = workload.end(workload.length or WINDOW)
+    t_end = workload.end(workload.length or FLIGHTS)
     seconds, n_collisions = 0.0, 0
     for _ in range(n_times):
         n, lasted = flights(workload.scene, followed, t_end)
@@ -107,7 +102,7 @@ def _trajectory(workload: Workload, n_times: int) -> SolverRun:
     for _ in range(n_times):
         fast.trajectory(workload.scene, states[0], workload.length)
     ns = time.perf_counter_ns() - begin
-    answers: list[Given] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
+    answers: list[SolverAnswer] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
     return SolverRun(ns / (n_times * workload.length), answers, ns)
 
 

@@ -62,7 +62,7 @@ def check(
     known_failures: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Known to fail, one per line: ID, ID@SEED, drawn/*, fresh/*, declined/GROUP."
+            metavar="FILE", help="Known to fail, one per line: ID, ID@SEED, fresh/*, declined/GROUP."
         ),
     ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="JSON report.")] = None,

@@ -12,7 +12,7 @@ import typer
 import reference
 from conformance import verify as verifier
 from conformance.audit.runs import scene_named
-from conformance.cases.scenes import wire_form
+from conformance.cases.draw import wire_form
 from conformance.files import write_file
 from conformance.suite.sheet_files import read_number, read_rows
 from mushrooms import output

@@ -18,7 +18,7 @@ from conformance.bench.scoreboard import Graded, page, reasons
 from conformance.cases import scenes
 from conformance.cases.draw import Draw
 from conformance.harness import examples
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
 from scene import BadInput, Collision, Horizon, State, load
 
@@ -27,7 +27,7 @@ from scene import BadInput, Collision, Horizon, State, load
 def library(tmp_path_factory):
     try:
         return baselines.build(tmp_path_factory.mktemp("baselines"), ["-O1"])[0]
-    except Trouble as trouble:
+    except CheckFailure as trouble:
         pytest.skip(trouble.why)
 
 
@@ -119,10 +119,10 @@ def test_a_particle_that_meets_nothing_is_told(library, engine):
 
 def test_without_a_compiler_the_reason_is_told(monkeypatch, tmp_path):
     monkeypatch.setattr(baselines, "SOURCE", tmp_path / "absent.c")
-    with pytest.raises(Trouble, match="it does not compile" if examples.shutil.which("cc") else "no C"):
+    with pytest.raises(CheckFailure, match="it does not compile" if examples.shutil.which("cc") else "no C"):
         baselines.build(tmp_path, [])
     monkeypatch.setattr(examples.shutil, "which", lambda _: None)
-    with pytest.raises(Trouble, match="no C compiler is installed"):
+    with pytest.raises(CheckFailure, match="no C compiler is installed"):
         baselines.build(tmp_path, [])
 
 

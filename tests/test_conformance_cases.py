@@ -17,13 +17,19 @@ import fast
 import reference
 from conformance import vectors
 from conformance.cases.attacks import UnderAttack, confirmed, flown, line, run
-from conformance.cases.certify import Links, Refuted, arrival, certify, claimed_path, marks, stays
-from conformance.cases.draw import Unfit
+from conformance.cases.certify import (
+    FalseClaim,
+    Links,
+    arrival,
+    capture_intervals,
+    certify,
+    claimed_path,
+    marks,
+)
+from conformance.cases.draw import Question, Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.prover import ask, flight_of, proved_step
-from conformance.cases.question import Question
+from conformance.cases.prover import ask, flight_of, inputs_of, moved, proved_step
 from conformance.cases.table import FAMILIES
-from conformance.grading.error import inputs_of, moved
 from conformance.vectors import NUMBERS, Expectation, certified, four_digits
 from conformance.verify import Verdict
 from mushrooms.attack import steppers
@@ -201,11 +207,11 @@ def test_a_false_claim_makes_no_vector(monkeypatch):
 
     monkeypatch.setattr(reference, "next_collision", lying)
     question = Question(load("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0, group="lie")
-    with pytest.raises(Refuted, match="lie/1 is false: "):
+    with pytest.raises(FalseClaim, match="lie/1 is false: "):
         certify(question, 1)
 
 
-@pytest.mark.parametrize(("status", "failure"), [("false", Refuted), ("not proved", Unfit)])
+@pytest.mark.parametrize(("status", "failure"), [("false", FalseClaim), ("not proved", Unfit)])
 def test_what_the_verifier_does_not_prove_makes_no_vector(monkeypatch, status, failure):
     question = Question(load("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0, 2, group="lie")
     assert certify(question, 1).collisions == 2
@@ -254,7 +260,7 @@ def test_allowances_bound_what_a_nudge_does():
 )
 def test_stays_by_what_hits_mean(found, spans):
     """Base hits ("") change nothing, free hits between captured ones do not divide a stay."""
-    assert list(stays(found)) == spans
+    assert list(capture_intervals(found)) == spans
 
 
 GALLERY = State(3.0, 0.0, 0.5, 2.0, 0.25)
@@ -277,11 +283,11 @@ def test_a_flow_keeps_of_its_path_what_is_asked():
     path = reference.trajectory(SCENE, GALLERY, 40, 6.0)
     steps, found = certify(ASKED._replace(flow=None), 1).expect[0].steps, marks(SCENE, path.steps)
     assert {"captured", ""} <= set(found)
-    kept = arrival(steps, stays(found))
+    kept = arrival(steps, capture_intervals(found))
     assert certify(ASKED, 1).expect == (kept,)
     assert certify(ASKED, 1).collisions == len(path.steps) + 1
     assert len(kept.steps) < len(steps)
-    for place, end in zip(kept.stays[0], stays(found)[0], strict=True):
+    for place, end in zip(kept.stays[0], capture_intervals(found)[0], strict=True):
         flown = [sum(step.ends("dt")[side] for step in kept.steps[: place + 1]) for side in (0, 1)]
         truth = [sum(step.ends("dt")[side] for step in steps[: end + 1]) for side in (0, 1)]
         assert flown[0] <= truth[0] <= truth[1] <= flown[1]

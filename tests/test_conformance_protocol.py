@@ -36,7 +36,7 @@ from conformance.harness.examples import Example, find_examples, find_kit_exampl
 from conformance.suite import answers, reports
 from conformance.suite import run as suite
 from conformance.suite.checks import ensembles, timing
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from conformance.suite.result import VERDICTS
 from conformance.suite.session import Limits
 from scene import BadInput, Horizon, load
@@ -254,12 +254,12 @@ def test_the_runner_reads_every_line_or_says_wrong_format(tally):
     vector = made_up(0)
     for line in fuzz.lines(2, N_LINES, fuzz.answers):
         for read in (answers.read_introduction, lambda sent: answers.check_echo([0.1, -0.0], sent)):
-            with suppress(Trouble):
+            with suppress(CheckFailure):
                 read(line)
         for cmd in answers.ANSWERS:
             try:
                 found = grade(vector, answers.read_answer(line, cmd, 1))
-            except Trouble as trouble:
+            except CheckFailure as trouble:
                 found = trouble
             assert "\n" not in found.why
             assert len(found.why) < 1000
@@ -322,7 +322,7 @@ def test_nonsense_ends_in_verdicts(monkeypatch, tally):
 
 
 def refuse_to_say(*_):
-    raise kit.Open("too close")
+    raise kit.UndecidedError("too close")
 
 
 ENGINES = {

@@ -14,9 +14,9 @@ from support.faulty_servers import FAULTS, HONEST, command
 
 from conformance.suite import run as suite
 from conformance.suite.answers import read_answer
-from conformance.suite.disguise import Disguise
-from conformance.suite.process import CommandNotFound, Trouble
+from conformance.suite.process import CheckFailure, CommandNotFound
 from conformance.suite.session import Limits, Session
+from conformance.suite.symmetry import Transform
 from conformance.vectors import Certified, Expectation, Vector
 from scene import State
 from scene.protocol.messages import with_minus_zeros
@@ -49,7 +49,7 @@ def made_up(number: int) -> Vector:
 
 def asked_alone(monkeypatch, vectors: list[Vector]) -> None:
     """Have a run ask these vectors and nothing else."""
-    for name in ("checks_of", "drawn_horizons", "fresh"):
+    for name in ("checks_of", "fresh"):
         monkeypatch.setattr(suite, name, lambda *_: [])
     monkeypatch.setattr(suite, "choose", lambda *_: vectors)
 
@@ -59,7 +59,7 @@ def verdicts(monkeypatch):
     """Return what runs the suite on a faulty server and leaves nothing running: its results by case."""
     monkeypatch.setenv("FAULTY_SERVER", token := secrets.token_hex(8))
     asked_alone(monkeypatch, [made_up(i) for i in range(N)])
-    monkeypatch.setattr(suite, "drawn_disguise", lambda *_: Disguise())  # faulty servers know one answer
+    monkeypatch.setattr(suite, "draw_transform", lambda *_: Transform())  # faulty servers know one answer
 
     def run(name: str, limits: Limits) -> suite.Run:
         found = suite.check(command(name), limits=limits)
@@ -238,7 +238,7 @@ LOST = b'{"seq":1,"states":[{"outcome":"%b","reason":"corner","captured":[1,2]}]
     ],
 )
 def test_misshapen_answers_are_named(line, cmd, word):
-    with pytest.raises(Trouble, match="wrong-format") as caught:
+    with pytest.raises(CheckFailure, match="wrong-format") as caught:
         read_answer(line, cmd, 1)
     assert word in caught.value.why
 

@@ -11,7 +11,6 @@ import msgspec
 import pytest
 from support.schemas import validator
 
-from conformance.cases import __main__ as command
 from conformance.cases import corpus as made
 from conformance.cases.bound_families import FAMILIES as BOUNDS
 from conformance.cases.coverage_families import FAMILIES as COVERAGE
@@ -282,30 +281,29 @@ def test_no_vector_of_that_name_and_no_such_level(ask, words):
 
 
 def test_the_command_writes_a_corpus_and_finds_what_differs(small, tmp_path, monkeypatch, capsys):
-    for module in (made, command):
-        monkeypatch.setattr(module, "groups", lambda: {"hard-case-06": 1, "hard-case-45": 1})
+    monkeypatch.setattr(made, "groups", lambda: {"hard-case-06": 1, "hard-case-45": 1})
     folder = tmp_path / "made"
-    assert command.main(["--out", str(folder), "--most", "1"]) == 0
+    assert made.main(["--out", str(folder), "--most", "1"]) == 0
     assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
     assert len(load("stress", folder)) == 2
-    assert command.main(["--out", str(folder), "--most", "1", "--check"]) == 0
-    assert command.main(["--out", str(small), "--most", "1", "--check"]) == 1
+    assert made.main(["--out", str(folder), "--most", "1", "--check"]) == 0
+    assert made.main(["--out", str(small), "--most", "1", "--check"]) == 1
     assert "hard-case-06/1: differs" in capsys.readouterr().out
-    assert command.main(["--out", str(tmp_path / "none"), "--most", "1", "--check"]) == 2
+    assert made.main(["--out", str(tmp_path / "none"), "--most", "1", "--check"]) == 2
     assert "manifest.json cannot be read" in capsys.readouterr().err
     with pytest.raises(SystemExit, match="2"):
-        command.main(["--most", "0"])
+        made.main(["--most", "0"])
 
 
 def test_questions_written_by_hand_are_added_to_their_groups(tmp_path, capsys):
     question = {name: json.loads(lines()[0])[name] for name in ("rule", "source", "scene", "state", "t_end")}
     file, folder = tmp_path / "new.jsonl", tmp_path / "made"
     file.write_text(json.dumps(question | {"group": "hard-case-01"}) + "\n")
-    assert command.main(["--out", str(folder), "--add", str(file)]) == 0
+    assert made.main(["--out", str(folder), "--add", str(file)]) == 0
     old, new = ({vector.id: vector for vector in load("stress", at)} for at in (CORPUS, folder))
     (name,) = new.keys() - old.keys()
     assert new.items() > old.items()
     assert name == f"hard-case-01/{len(made.by_hand()['hard-case-01']) + 1}"
     file.write_text(json.dumps(question | {"group": "moving-cap"}) + "\n")
-    assert command.main(["--out", str(folder), "--add", str(file)]) == 2
+    assert made.main(["--out", str(folder), "--add", str(file)]) == 2
     assert "group = 'moving-cap', must begin with" in capsys.readouterr().err

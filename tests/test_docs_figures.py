@@ -20,7 +20,6 @@ from conformance.mutants import MUTANTS
 from conformance.suite.checks.flows import MAX_STATES
 from conformance.suite.checks.paths import MAX_HITS, MAX_WAIT
 from conformance.suite.checks.refusals import MOST_SAMPLES
-from conformance.suite.disguise import N_DRAWN
 from fast.given import MAX_CYCLES, MOST_IN_CYCLES, MOST_TO_A_TIME
 from fast.kernel.kept import LANE_ROWS
 from mushrooms.orbits import MAX_COLLISIONS, MAX_ORBITS
@@ -104,7 +103,6 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "times of others": ("README.md", lambda: f"| {NS['lean C']:.0f} ns |"),
     "time of a call": ("README.md", lambda: f"| {NS['fast, a call'] / 1e3:.1f} µs |"),
     "time of a proof": ("README.md", lambda: f"| {NS['proof, 50 digits'] / 1e6:.1f} ms |"),
-    "drawn questions": ("docs/protocol.md", lambda: f"{N_DRAWN} drawn questions"),
     "fresh questions": (
         "docs/protocol.md",
         lambda: f"{ROUND} questions ({2 * ROUND} above core)",

@@ -135,7 +135,7 @@ def test_one_particle_takes_the_steps_of_the_lanes(name, tally):
 def errors_of(scene, rows, codes, answers):
     """Return which walls differ from the careful step's, and backward ulps where no nudge changes the wall.
 
-    As `conformance.grading.error`, with derivatives by differences: a million of them take a minute.
+    As `conformance.grading.agreement`, with derivatives by differences: a million of them take a minute.
     """
     compiled = compile_scene(scene)
 

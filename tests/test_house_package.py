@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from conformance.cases.__main__ import archive
+from conformance.cases.corpus import archive
 from conformance.vectors import manifest
 
 ROOT = Path(__file__).parent.parent

@@ -16,9 +16,8 @@ from support.truth import centre, proved_step
 
 import fast
 import reference.path
-from conformance.cases.prover import ask, ends, flight_of
+from conformance.cases.prover import ask, condition_number, ends, flight_of, inputs_of, moved
 from conformance.grading.agreement import compare, exact
-from conformance.grading.error import condition_number, inputs_of, moved
 from conformance.strategies import scenes_and_states
 from conformance.vectors import NUMBERS, Expectation, certified
 from scene import BangBang, Cap, Fourier, Mushroom, State, load

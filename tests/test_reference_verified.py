@@ -17,7 +17,7 @@ from support.truth import IS_DEEP, is_delicate, proved_step
 
 import reference
 from conformance.cases.certify import claimed_path
-from conformance.cases.scenes import wire_form
+from conformance.cases.draw import wire_form
 from conformance.strategies import scenes_and_states
 from conformance.vectors import Expectation
 from conformance.verify import Verdict, verify_line

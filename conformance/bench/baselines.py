@@ -28,10 +28,10 @@ from mpmath import fp
 from scipy.integrate import solve_ivp
 
 from conformance import plain
-from conformance.bench.solvers import Family, Given, Solver, SolverRun, by_call
-from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
+from conformance.bench.solvers import Family, Solver, SolverAnswer, SolverRun, by_call
+from conformance.bench.workloads import FLIGHTS, SINGLE_STEPS, Workload
 from conformance.harness import examples
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from scene import (
     BadInput,
     BangBang,
@@ -65,7 +65,7 @@ NONE = 5
 CAP, STEM, MUSHROOM = range(3)
 CONSTANT, FOURIER, BANG_BANG = range(3)
 FLAGS = ("-O3", "-march=native")  # for the C compiler
-MOST = 10 * int(WINDOW)  # collisions of a particle: one that hops along the arc would never end
+MOST = 10 * int(FLIGHTS)  # collisions of a particle: one that meets the arc again and again would never end
 
 
 class Questions(NamedTuple):
@@ -130,12 +130,12 @@ def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
         The library, and the line that compiled it, paths left out.
 
     Raises:
-        Trouble: there is no compiler, or it fails.
+        CheckFailure: there is no compiler, or it fails.
     """
     library = folder / "baselines.so"
     built = examples.compiled("C", [*flags, "-std=gnu11", "-shared", "-fPIC"], SOURCE, library, ["-lm"])
     if built.why_not:
-        raise Trouble("unsupported" if built.is_absent else "error", built.why_not)
+        raise CheckFailure("unsupported" if built.is_absent else "error", built.why_not)
     return library, built.built
 
 
@@ -143,7 +143,7 @@ def in_c(library: Path) -> list[Solver]:
     """Return the solvers that the compiled C file holds."""
     return [
         _solver("lean C", "lean", Engine(library)),
-        *(_solver(f"steps, flight/{n}", "fixed-step", Engine(library, n), 10 * WINDOW / n) for n in PARTS),
+        *(_solver(f"steps, flight/{n}", "fixed-step", Engine(library, n), 10 * FLIGHTS / n) for n in PARTS),
     ]
 
 
@@ -162,8 +162,8 @@ def stepper(solver: Solver) -> Stepper:
     return step
 
 
-def _solver(name: str, family: Family, engine: Engine, flights: float = WINDOW) -> Solver:
-    def steps(scene: Scene, states: Sequence[State]) -> list[Given]:
+def _solver(name: str, family: Family, engine: Engine, flights: float = FLIGHTS) -> Solver:
+    def steps(scene: Scene, states: Sequence[State]) -> list[SolverAnswer]:
         return [_outcome(row) for row in engine.hits(questions(scene, states)).tolist()]
 
     def run(workload: Workload, n_times: int) -> SolverRun:
@@ -173,24 +173,24 @@ def _solver(name: str, family: Family, engine: Engine, flights: float = WINDOW) 
             followed, t_end, most = states[:1], np.inf, workload.length
         n_hits, seconds = engine.follow(questions(workload.scene, followed), t_end, most, n_times)
         if not n_hits:
-            raise Trouble("fail", "it meets no wall")
+            raise CheckFailure("fail", "it meets no wall")
         return SolverRun(seconds / n_hits * 1e9, steps(workload.scene, states), seconds * 1e9)
 
     serves = SINGLE_STEPS if family == "fixed-step" else (*SINGLE_STEPS, "one-path")
     return Solver(name, family, run, serves, steps)
 
 
-def _outcome(row: list[float]) -> Given:
+def _outcome(row: list[float]) -> SolverAnswer:
     *numbers, wall = row
     return Horizon(*numbers[1:]) if wall == NONE else Collision(WALLS[int(wall)], *numbers)
 
 
 def questions(scene: Scene, states: Sequence[State]) -> Questions:
     """Return a scene and states as the engines take them."""
-    given = laws(scene)
+    known = laws(scene)
     width = (0.0,) if isinstance(scene, Cap) else width_factors(scene)
-    rows = [given.get("r", 0.0), width[0], width[1] if len(width) > 1 else 1.0]
-    rows += [given.get("h", 0.0), given.get("slope", 0.0)]
+    rows = [known.get("r", 0.0), width[0], width[1] if len(width) > 1 else 1.0]
+    rows += [known.get("h", 0.0), known.get("slope", 0.0)]
     table = CAP if isinstance(scene, Cap) else STEM if isinstance(scene, Stem) else MUSHROOM
     starts = [(s.t, s.x, s.y, s.vx, s.vy, WALLS.index(s.wall) if s.wall else NONE) for s in states]
     length = float(rounded(scene, states[0].t).size)
@@ -284,7 +284,7 @@ def main(arguments: Sequence[str]) -> None:
 
     Raises:
         BadInput: there is no such baseline.
-        Trouble: it cannot be built here.
+        CheckFailure: it cannot be built here.
     """
     name = arguments[0] if len(arguments) == 1 else ""
     if name not in NAMES:

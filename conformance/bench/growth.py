@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from conformance.bench.record import Growth, short
 from conformance.bench.workloads import RULES, Prover, draw_workload
-from conformance.grading.error import Matrix, U, inputs_of
-from scene import Collision, Scene, State
+from conformance.grading.agreement import U
+from scene import Scene, State
 from scene.geometry import rounded
 
 FloatArray = npt.NDArray[np.float64]
@@ -35,15 +35,26 @@ class PathPoint(NamedTuple):
     width: float = 0.0
 
 
+class Sensitivity(NamedTuple):
+    """What the chained Jacobians of a path say after a collision.
+
+    Attributes:
+        allowance: for dt, x, y, vx, vy what rounding the states so far may do, as in `vectors.Certified`.
+        jacobian: (5, 5), of t, x, y, vx, vy by those of the start.
+    """
+
+    allowance: Sequence[float]
+    jacobian: FloatArray
+
+
 PathFollower = Callable[[Scene, State, int], list[PathPoint]]
-Linearised = Callable[[Scene, State, float], tuple[Collision, Matrix]]  # a proved step and its Jacobian
+PathProver = Callable[[Scene, State, int], tuple[list[PathPoint], list[Sensitivity]]]
 
 
 def grow(
     followers: dict[str, PathFollower],
     prove: Prover,
-    linearise: Linearised,
-    prove_path: PathFollower,
+    prove_path: PathProver,
     seed: int,
     n_paths: int,
     n_collisions: int,
@@ -54,8 +65,7 @@ def grow(
     Args:
         followers: by name; a path may end early, which counts as having no digit left.
         prove: one step, for the draws.
-        linearise: one step, with its Jacobian.
-        prove_path: a trajectory, right to many digits at its end.
+        prove_path: a trajectory, right to many digits at its end, and how it depends on its states.
         seed: of the draws.
         n_paths: how many trajectories.
         n_collisions: of each.
@@ -66,12 +76,12 @@ def grow(
     errors: dict[str, list[FloatArray]] = {name: [] for name in followers}
     bounds, growths = [], []
     for question in workload.questions:
-        truth = prove_path(workload.scene, question.state, n_collisions)
+        truth, chain = prove_path(workload.scene, question.state, n_collisions)
         size = rounded(workload.scene, question.state.t).r
         speed = math.hypot(question.state.vx, question.state.vy)
         for name, follow in followers.items():
             errors[name].append(_errors(follow(workload.scene, question.state, n_collisions), truth, size))
-        bound, growth = _chained(workload.scene, question.state, n_collisions, linearise, size, speed)
+        bound, growth = _chained(truth, chain, size, speed)
         bounds.append(bound)
         growths.append(growth)
         tick("")
@@ -108,28 +118,15 @@ def _last(errors: FloatArray) -> int:
 
 
 def _chained(
-    scene: Scene, state: State, n_collisions: int, linearise: Linearised, size: float, speed: float
+    truth: Sequence[PathPoint], chain: Sequence[Sensitivity], size: float, speed: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the predicted bound and the norm of the chained Jacobians after each collision.
-
-    The steps' Jacobians are taken along a path of proved steps, each from the rounded end of the one before.
-    """
+    """Return the predicted bound and the norm of the chained Jacobians after each collision."""
     scales = np.array([size / speed, size, size, speed, speed])
-    product = np.eye(5)
-    shares: list[FloatArray] = []  # what each earlier step's rounding has become
     bounds, growths = [], []
-    for _ in range(n_collisions):
-        met, jacobian = linearise(scene, state, state.t + FAR)
-        step, inputs, state = np.array(jacobian), np.array(inputs_of(state)), met.state()
-        outputs = np.array([met.dt, *inputs_of(state)[1:]])
-        rounding = float(U) * (np.abs(step) @ np.abs(inputs) + np.abs(outputs))
-        step[0, 0] += 1.0  # from the flight time to the time
-        shares = [step @ share for share in shares]
-        shares.append(np.diag(rounding))
-        product = step @ product
-        total = sum((np.abs(share).sum(axis=1) for share in shares), np.zeros(5))
-        bounds.append(float(np.max((total / scales)[1:])))
-        growths.append(float(np.linalg.norm(product * scales[None, :] / scales[:, None], 2)))
+    for place, (allowance, jacobian) in zip(truth, chain, strict=True):
+        outputs = np.abs(np.array(place[1:5], dtype=float))
+        bounds.append(float(U) * float(np.max((allowance[1:] + outputs) / scales[1:])))
+        growths.append(float(np.linalg.norm(jacobian * scales[None, :] / scales[:, None], 2)))
     return np.minimum(bounds, 1.0), np.array(growths)
 
 

@@ -14,15 +14,13 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from fractions import Fraction
 from functools import cache, partial
-from typing import Any, Literal, NamedTuple
-
-import msgspec
+from typing import Literal, NamedTuple
 
 from conformance.bench.record import Point, short
 from conformance.bench.workloads import SINGLE_STEPS, ProvedStep, Workload
 from conformance.grading.agreement import Answer, Enclosed, compare, exact
 from conformance.suite.checks import Implementation, timing
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits, Session, missing
 from conformance.vectors import NUMBERS, Certified
 from scene import Collision, Scene, State, Undecided, to_data
@@ -30,7 +28,7 @@ from scene import Collision, Scene, State, Undecided, to_data
 Family = Literal[
     "proof", "compiled", "interpreted", "time-stepping", "fixed-step", "lean", "example", "command"
 ]
-Given = Answer | None  # None: a step that this solver leaves to another
+SolverAnswer = Answer | None  # None: a step that this solver leaves to another
 
 
 class SolverRun(NamedTuple):
@@ -43,7 +41,7 @@ class SolverRun(NamedTuple):
     """
 
     ns: float
-    answers: list[Given]
+    answers: list[SolverAnswer]
     lasted: float
 
 
@@ -53,7 +51,7 @@ class Solver(NamedTuple):
     Attributes:
         name: as in the plot.
         family: what kind of thing it is.
-        run: (workload, n_times) -> a run in which every step is taken n_times; raises Trouble.
+        run: (workload, n_times) -> a run in which every step is taken n_times; raises CheckFailure.
         serves: the workloads it can run.
         steps: one step from each of many states, quickly; None where there is no such thing.
     """
@@ -62,14 +60,14 @@ class Solver(NamedTuple):
     family: Family
     run: Callable[[Workload, int], SolverRun]
     serves: tuple[str, ...] = SINGLE_STEPS
-    steps: Callable[[Scene, Sequence[State]], Sequence[Given]] | None = None
+    steps: Callable[[Scene, Sequence[State]], Sequence[SolverAnswer]] | None = None
 
 
-def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Given]) -> Solver:
+def by_call(name: str, family: Family, step: Callable[[Scene, State, float], SolverAnswer]) -> Solver:
     """Return a Python function of one step as a solver; the call is part of its time."""
 
     def run(workload: Workload, n_times: int) -> SolverRun:
-        answers: list[Given] = []
+        answers: list[SolverAnswer] = []
         begin = time.perf_counter_ns()
         for _ in range(n_times):
             answers = [step(workload.scene, q.state, q.t_end) for q in workload.questions]
@@ -93,41 +91,35 @@ def by_command(
 
     Raises:
         CommandNotFound: there is no such program.
-        Trouble: it does not introduce itself.
+        CheckFailure: it does not introduce itself.
     """
     session = stack.enter_context(Session(command, limits))
     session.start()
-    clock_trouble = cache(partial(_clock_trouble, session))  # its clock is looked at once
+    clock_failure = cache(partial(_clock_failure, session))  # its clock is looked at once
 
     def run(workload: Workload, n_times: int) -> SolverRun:
         assert session.introduction is not None
-        scene = to_data(workload.scene)
-        if lacking := missing(session.introduction, "time", scene):
-            raise Trouble("unsupported", lacking)
-        answers: list[Given] = []
+        if lacking := missing(session.introduction, "time", to_data(workload.scene)):
+            raise CheckFailure("unsupported", lacking)
+        answers: list[SolverAnswer] = []
         lasted = 0
         for question in workload.questions:
-            request: dict[str, Any] = {"cmd": "time", "scene": scene, "collisions": 1}
-            request |= {"state": msgspec.to_builtins(question.state), "repeat": n_times}
-            begin = time.monotonic()
-            found = session.ask(request)
-            seconds = time.monotonic() - begin
-            ns, last = timing.read_repeats(found, n_times, seconds, question.state.t)
-            lasted += sum(ns)
-            answers.append(last)
-        if (trouble := clock_trouble()) is not None:
-            raise trouble
+            found = timing.ask_time(session, workload.scene, question.state, 1, n_times)
+            lasted += sum(found.ns)
+            answers.append(found.last)
+        if (failure := clock_failure()) is not None:
+            raise failure
         return SolverRun(lasted / (n_times * len(answers)), answers, lasted)
 
     return Solver(name, family, run)
 
 
-def _clock_trouble(session: Session) -> Trouble | None:
+def _clock_failure(session: Session) -> CheckFailure | None:
     """Hold what a command says of its time to the clock on this side; a run is too short to do so."""
     try:
         timing.honest_clock(Implementation(session, "time"), timing.SCENES[0], timing.START)
-    except Trouble as trouble:
-        return trouble
+    except CheckFailure as failure:
+        return failure
     return None
 
 
@@ -167,36 +159,36 @@ def measure(
         tick: called with a solver's name before its warm-up, and after every round with "".
 
     Returns:
-        A point for each solver, and those that failed with their trouble.
+        A point for each solver, and what failed of the others.
     """
     running: list[tuple[Solver, int, int]] = []
     runs: dict[str, list[SolverRun]] = {}
-    troubles: dict[str, str] = {}
+    failures: dict[str, str] = {}
     for solver in solvers:
         if workload.name not in solver.serves:
             continue
         tick(solver.name)
         try:
             running.append(_warm_up(solver, workload, effort))
-        except Trouble as trouble:
-            troubles[solver.name] = f"{trouble.verdict}: {trouble.why}"
+        except CheckFailure as failure:
+            failures[solver.name] = f"{failure.verdict}: {failure.why}"
             continue
         runs[solver.name] = []
     for number in range(effort.repeats):
         for solver, n_times, n_runs in running:
-            if number < n_runs and solver.name not in troubles:
+            if number < n_runs and solver.name not in failures:
                 try:
                     runs[solver.name].append(solver.run(workload, n_times))
                     _check_runs(runs[solver.name])
-                except Trouble as trouble:
-                    troubles[solver.name] = f"{trouble.verdict}: {trouble.why}"
+                except CheckFailure as failure:
+                    failures[solver.name] = f"{failure.verdict}: {failure.why}"
         tick("")
     points = [
         _point(workload, solver, n_times, runs[solver.name])
         for solver, n_times, _ in running
-        if solver.name not in troubles
+        if solver.name not in failures
     ]
-    return points, troubles
+    return points, failures
 
 
 def _warm_up(solver: Solver, workload: Workload, effort: Effort) -> tuple[Solver, int, int]:
@@ -212,9 +204,9 @@ def _warm_up(solver: Solver, workload: Workload, effort: Effort) -> tuple[Solver
 
 def _check_runs(runs: Sequence[SolverRun]) -> None:
     if not runs[-1].ns:
-        raise Trouble("fail", "a run is said to last 0 ns in all")
+        raise CheckFailure("fail", "a run is said to last 0 ns in all")
     if repr(runs[-1].answers) != repr(runs[0].answers):
-        raise Trouble("fail", "its answers differ from run to run")
+        raise CheckFailure("fail", "its answers differ from run to run")
 
 
 def _point(workload: Workload, solver: Solver, n_times: int, runs: Sequence[SolverRun]) -> Point:
@@ -243,23 +235,23 @@ def _count_walls(workload: Workload, solver: Solver) -> tuple[int, int]:
     """Return how many of the further steps the solver answers, and how many with a wrong wall."""
     if solver.steps is None or not workload.further:
         return 0, 0
-    given = solver.steps(workload.scene, [step.state for step in workload.further])
-    pairs = [(a, step.wall) for a, step in zip(given, workload.further, strict=True)]
+    answers = solver.steps(workload.scene, [step.state for step in workload.further])
+    pairs = [(a, step.wall) for a, step in zip(answers, workload.further, strict=True)]
     answered = [(a, wall) for a, wall in pairs if not isinstance(a, Undecided | None)]
     return len(answered), sum(getattr(a, "wall", None) != wall for a, wall in answered)
 
 
-def _grade(given: Given, question: ProvedStep) -> tuple[str, float, float]:
+def _grade(found: SolverAnswer, question: ProvedStep) -> tuple[str, float, float]:
     """Return right, wrong, undecided or left, and of a right answer its backward ulps and relative error."""
-    if given is None:
+    if found is None:
         return "left", 0.0, 0.0
-    answer = _enclosed(given)
-    found = compare(answer, question.truth, question.state)
-    if found.kind == "undecided":
+    answer = _enclosed(found)
+    agreement = compare(answer, question.truth, question.state)
+    if agreement.kind == "undecided":
         return "undecided", 0.0, 0.0
-    if math.isnan(found.ulps) or not isinstance(answer, Enclosed):
+    if math.isnan(agreement.ulps) or not isinstance(answer, Enclosed):
         return "wrong", 0.0, 0.0
-    return "right", found.ulps, relative_error(answer, question.truth.steps[0])
+    return "right", agreement.ulps, relative_error(answer, question.truth.steps[0])
 
 
 def _enclosed(answer: Answer) -> Answer:
@@ -275,11 +267,11 @@ def relative_error(answer: Enclosed, truth: Certified) -> float:
 
     None is larger than MOST: a wall may be right where the numbers are off by more than binary64 holds.
     """
-    given = dict(zip(NUMBERS, answer.ends, strict=True))
+    ends = dict(zip(NUMBERS, answer.ends, strict=True))
     worst = Fraction(0)
     for vector in (("dt",), ("x", "y"), ("vx", "vy")):
         centres = {name: truth.centre(name) for name in vector}
         size = max(map(abs, centres.values()))
-        error = max(abs(end - centres[name]) for name in vector for end in given[name])
+        error = max(abs(end - centres[name]) for name in vector for end in ends[name])
         worst = max(worst, error / size) if size else worst
     return float(min(worst, MOST))

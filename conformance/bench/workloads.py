@@ -1,7 +1,7 @@
 """The named workloads: single steps with proved answers, drawn anew from a seed.
 
 A question is a state as a trajectory meets it: drawn in the table, flown to its first collision, rounded.
-The states of a workload lie within WINDOW flights of each other, so that an engine which follows them on
+The states of a workload lie within FLIGHTS flights of each other, so that an engine which follows them on
 does comparable work at every energy. Every answer is a collision; other draws are drawn again.
 
 Proofs are slow, and a few dozen questions show no rare mistake. So each workload draws many further steps by
@@ -16,13 +16,13 @@ from conformance.cases.draw import Draw
 from conformance.cases.scenes import place, state, walls_speed
 from conformance.grading.agreement import middle
 from conformance.vectors import Expectation
-from scene import BangBang, Cap, Collision, Fourier, Mushroom, Scene, State, Wall, load
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, Outcome, Scene, State, Undecided, Wall, load
 from scene.geometry import rounded
 from scene.states import Stepper
 
 DIGITS = 230  # of the proved answers: beyond any solver's
-WINDOW = 1000.0  # flights
-PHASE = 0.3  # of the cycle, where the window begins
+FLIGHTS = 1000.0  # flights
+PHASE = 0.3  # of the cycle, where the flights begin
 MAX_DRAWS = 100
 # (scene, state, t_end, digits) -> certified answer of a step; None where the proof is undecided.
 Prover = Callable[[Scene, State, float, int], Expectation | None]
@@ -63,7 +63,7 @@ class Workload(NamedTuple):
     length: int = 0
     further: Sequence[FurtherStep] = ()
 
-    def end(self, flights: float = WINDOW) -> float:
+    def end(self, flights: float = FLIGHTS) -> float:
         """Return the time that lies so many flights after the last question."""
         last = max((q.state for q in self.questions), key=lambda state: state.t)
         flight = float(rounded(self.scene, last.t).size) / math.hypot(last.vx, last.vy)
@@ -77,7 +77,7 @@ class Rule(NamedTuple):
         name, what: as in Workload.
         scene: of the catalogue, or of SCENES.
         draw: from a stream of numbers, the scene and a time to a state.
-        speed: about that of the particle, for the length of the window.
+        speed: about that of the particle, for the time that the flights take.
         is_flown: whether the question begins at the first collision of what was drawn.
         length: as in Workload.
     """
@@ -197,13 +197,19 @@ def draw_workload(
     return Workload(rule.name, rule.what, scene, questions, rule.length, further)
 
 
-def _starts(rule: Rule, scene: Scene, key: str) -> Iterator[Drawn]:
-    """Draw starts until one is taken."""
+def _starts(rule: Rule, scene: Scene, key: str, step: Stepper) -> Iterator[Drawn]:
+    """Draw starts until one is taken; where the rule says so, each is flown to its first collision."""
     span, size = scene.period or 1.0, rounded(scene, 0.0).size
     for attempt in range(MAX_DRAWS):
         stream = Draw(f"{key} {attempt}")
-        t = span * PHASE + stream.part() * min(span, WINDOW * size / rule.speed)
-        yield rule.draw(stream, scene, t)
+        t = span * PHASE + stream.part() * min(span, FLIGHTS * size / rule.speed)
+        start, t_end = rule.draw(stream, scene, t)
+        if rule.is_flown:
+            met = step(scene, start, t_end)
+            if not isinstance(met, Collision):
+                continue
+            start, t_end = met.state(), t_end + met.t - start.t
+        yield start, t_end
     raise RuntimeError(f"{key}: no collision in {MAX_DRAWS} draws")
 
 
@@ -213,25 +219,19 @@ def _is_folded(scene: Scene, *walls: Wall | None) -> bool:
 
 
 def _further_step(rule: Rule, scene: Scene, key: str, trust: Stepper) -> FurtherStep:
-    for start, t_end in _starts(rule, scene, key):
+    for start, t_end in _starts(rule, scene, key, trust):
         met = trust(scene, start, t_end)
-        if rule.is_flown and isinstance(met, Collision):
-            start = met.state()
-            met = trust(scene, start, t_end)
         if isinstance(met, Collision) and not _is_folded(scene, start.wall, met.wall):
             return FurtherStep(start, met.wall)
     raise AssertionError
 
 
 def _question(rule: Rule, scene: Scene, key: str, prove: Prover) -> ProvedStep:
-    for start, t_end in _starts(rule, scene, key):
-        if rule.is_flown:
-            first = prove(scene, start, t_end, 20)
-            met = middle(first, start)[0] if first else None
-            if not isinstance(met, Collision):
-                continue
-            t_end += met.t - start.t
-            start = met.state()
+    def step(scene: Scene, start: State, t_end: float) -> Outcome:
+        first = prove(scene, start, t_end, 20)
+        return middle(first, start)[0] if first else Undecided("the proof is undecided")
+
+    for start, t_end in _starts(rule, scene, key, step):
         truth = prove(scene, start, t_end, DIGITS)
         if truth is None or truth.outcome != "collision":
             continue

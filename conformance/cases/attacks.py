@@ -15,8 +15,8 @@ from typing import NamedTuple
 import msgspec
 
 from conformance.cases.certify import claimed_path, judge
+from conformance.cases.draw import Family, Proved, Question, file_vector
 from conformance.cases.prover import proved_step
-from conformance.cases.question import Family, Proved, Question, filed
 from conformance.grading.agreement import compare
 from conformance.vectors import Expectation
 from scene import Outcome, Rejected, Scene, State, Undecided, from_data
@@ -88,7 +88,7 @@ def run(
         n_cases: cases of each.
         seed: with the family's name and the index, it names a case for ever.
         steppers: under attack.
-        progress: told after every case.
+        progress: called after every case.
 
     Returns:
         One tally a family: every stepper asked adds one verdict a question.
@@ -153,7 +153,7 @@ def confirmed(attack: Question) -> Judgement:
         return Judgement("undecided", claim.reason, seconds=seconds)
     written = Expectation("collision", claim.steps) if is_undecided else claim
     proved = Proved((written,), collisions=max(n_steps, 1))
-    verdict = judge(filed(attack._replace(group="attack", flow=None), 1, proved, "stress"))
+    verdict = judge(file_vector(attack._replace(group="attack", flow=None), 1, proved, "stress"))
     if verdict.status == "false":
         return Judgement("wrong", f"the reference claims what is false: {verdict.reason}", seconds=seconds)
     if is_undecided:

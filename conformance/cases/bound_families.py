@@ -1,8 +1,8 @@
 """Families aimed at the slack of bounds by which a stepper excludes hits.
 
-Between two looks at a wall's f > 0 a stepper proves by a bound of f'' that the wall is not met. Who forgets
-a term of f'' there never sees a wall that meets the particle for a short time and draws back. Each term is
-made the only one that matters, for each kind of law:
+Between two looks at a wall's f > 0 a stepper proves by a bound of f'' that the wall is not met. If a term
+of f'' is forgotten there, a wall that meets the particle for a short time and draws back is never seen. Each
+term is made the only one that matters, for each kind of law:
 
     arc      f'' = 2 (r'^2 + r r'' - v^2)
     floor    f'' = h''
@@ -18,9 +18,8 @@ from functools import partial
 from math import hypot
 from typing import NamedTuple
 
-from conformance.cases.draw import Draw, Unfit
+from conformance.cases.draw import Draw, Family, Question, Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.question import Family, Question
 from conformance.cases.run_families import MOVABLE
 from conformance.cases.scenes import (
     LONGEST,

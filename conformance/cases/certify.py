@@ -21,21 +21,24 @@ import numpy as np
 import numpy.typing as npt
 
 import reference
-from conformance.cases.draw import Unfit
+from conformance.cases.draw import Mark, Proved, Question, Unfit, file_vector
 from conformance.cases.prover import (
     CONDITIONS,
     NUDGES,
     SIGNS,
+    Matrix,
     ask,
     coasted,
     collided,
+    condition_number,
     ends,
     expectation,
     flight_of,
+    free_flight,
+    inputs_of,
     nudged,
 )
-from conformance.cases.question import Mark, Proved, Question, filed
-from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of
+from conformance.plain.flow import CaptureInterval
 from conformance.vectors import (
     NUMBERS,
     Certified,
@@ -155,7 +158,7 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     if any(map(_is_wide, steps)):
         return proved_path(scene, question, 2 * path.digits)
     if question.flow:
-        arrived = arrival(steps, stays(captured))
+        arrived = arrival(steps, capture_intervals(captured))
         largest = max(links.condition, timing_condition(arrived, state))
         if largest > question.longest:
             raise Unfit("the horizon is too delicate")
@@ -234,24 +237,21 @@ def marks(scene: Scene, steps: Sequence[reference.Collision]) -> list[Mark]:
     return found
 
 
-def stays(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
+def capture_intervals(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
     """Return begin and end of each stay as places in a path whose horizon comes after its last mark.
 
     A stay begins with its first captured hit. It ends with the first arc hit after its last captured one, or
     where the particle meets a wall of the stem if that comes first, or at the horizon.
     """
     spans: list[tuple[int, int]] = []
-    begin: int | None = None
-    end: int | None = None
+    interval = CaptureInterval()  # of places in the path, in place of times
     for place, mark in enumerate([*found, "out"]):
-        if mark == "captured":
-            begin, end = place if begin is None else begin, None
-        elif mark == "free" and end is None:
-            end = place
+        if mark in ("captured", "free"):
+            interval = interval.after(place, mark == "captured")
         elif mark == "out":
-            if begin is not None:
-                spans.append((begin, place if end is None else end))
-            begin = end = None
+            if span := interval.until(place):
+                spans.append((int(span[0]), int(span[1])))
+            interval = CaptureInterval()
     return tuple(spans)
 
 
@@ -302,7 +302,7 @@ def _is_captured(scene: Mushroom, step: reference.Collision) -> bool:
 INFINITE = 1e300
 
 
-class Refuted(BadInput):
+class FalseClaim(BadInput):
     """The verifier holds the reference's answer to be false: one of the two is mistaken."""
 
 
@@ -315,7 +315,7 @@ def certify(question: Question, number: int) -> Vector:
 
     Raises:
         Unfit: when there is no answer to certify, or the verifier cannot prove it.
-        Refuted: when the verifier holds it to be false.
+        FalseClaim: when the verifier holds it to be false.
     """
     scene: Scene | None = None
     try:
@@ -328,11 +328,11 @@ def certify(question: Question, number: int) -> Vector:
     also = [Expectation(kind) for kind in question.also]
     expect = tuple(dict.fromkeys([*proved.expect, *also]))
     rounded = four_digits(min(proved.condition, INFINITE))
-    vector = filed(question, number, proved._replace(expect=expect, condition=rounded), "stress")
+    vector = file_vector(question, number, proved._replace(expect=expect, condition=rounded), "stress")
     vector = msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
     verdict = judge(vector)
     if verdict.status != "proved":
-        failure = Refuted if verdict.status == "false" else Unfit
+        failure = FalseClaim if verdict.status == "false" else Unfit
         raise failure(f"{vector.id} is {verdict.status}: {verdict.reason}")
     return vector
 

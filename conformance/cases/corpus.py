@@ -1,13 +1,18 @@
-"""The corpus as the table of families makes it, and as it was published.
+"""The corpus as the table of families makes it, and as it was published; `python -m conformance.cases`.
 
 Every drawn vector is drawn from a stream seeded by its id; every question written by hand stands in its
 published line, and nowhere else. All are answered by the reference and proved by the verifier, so the same
-corpus comes out on every machine, bit for bit.
+corpus comes out on every machine, bit for bit. The command makes the corpus, adds to it, checks that it is
+what would be made, or packs it: some ten minutes on one core; `--jobs N` shares them out.
 """
 
+import argparse
 import hashlib
-from collections import defaultdict
-from collections.abc import Iterable
+import sys
+import zipfile
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from math import inf
 from pathlib import Path
@@ -15,12 +20,11 @@ from pathlib import Path
 import msgspec
 
 from conformance.cases.certify import certify
-from conformance.cases.draw import Draw, Unfit
+from conformance.cases.draw import Draw, Family, Question, Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.question import Family, Question
 from conformance.cases.table import FAMILIES
 from conformance.files import write_file
-from conformance.vectors import MANIFEST, File, Manifest, Vector, digest, encode, load
+from conformance.vectors import MANIFEST, File, Manifest, Vector, digest, encode, load, manifest
 from scene import BadInput
 
 VERSION = "1.3"
@@ -66,7 +70,7 @@ def groups() -> dict[str, int]:
     return written | {name: family.n_vectors for name, family in FAMILIES.items() if family.n_vectors}
 
 
-def drawn(family: Family, number: int) -> Vector:
+def draw_vector(family: Family, number: int) -> Vector:
     """Return a family's vector of that number: its first draw that has a certified answer."""
     first = family.first_attempts[number - 1] if family.first_attempts else 0
     for attempt in range(first, first + ATTEMPTS):
@@ -96,10 +100,10 @@ def make(group: str, number: int) -> Vector:
         return next(vector for vector in load("stress", FOLDER) if vector.id == name)
     if group in by_hand():
         return certify(question_of(by_hand()[group][number - 1]), number)
-    return drawn(FAMILIES[group], number)
+    return draw_vector(FAMILIES[group], number)
 
 
-def added(path: Path) -> list[Vector]:
+def certify_added(path: Path) -> list[Vector]:
     """Certify questions that were written by hand, which go to the ends of their groups.
 
     Args:
@@ -137,9 +141,99 @@ def write(folder: Path, vectors: Iterable[Vector]) -> Manifest:
         data = encode(held)
         write_file(folder / name, data)
         entries[name] = File(hashlib.sha256(data).hexdigest(), len(held))
-    manifest = Manifest(VERSION, digest(entries, RETIRED), entries, RETIRED)
-    write_file(folder / MANIFEST, msgspec.json.format(msgspec.json.encode(manifest)) + b"\n")
+    written = Manifest(VERSION, digest(entries, RETIRED), entries, RETIRED)
+    write_file(folder / MANIFEST, msgspec.json.format(msgspec.json.encode(written)) + b"\n")
     for stale in sorted(folder.glob("*.jsonl")):
         if stale.name not in entries:
             stale.unlink()
-    return manifest
+    return written
+
+
+def _made(most: int | None, n_jobs: int) -> list[Vector]:
+    """Make all vectors, or the first few of each group, on so many processes."""
+    wanted = [
+        (group, number)
+        for group, n in groups().items()
+        for number in range(1, min(n, most or n) + 1)
+        if f"{group}/{number}" not in RETIRED
+    ]
+    found = []
+    with ProcessPoolExecutor(n_jobs) as pool:
+        for vector in pool.map(make, *zip(*wanted, strict=True), chunksize=4):
+            found.append(vector)
+            if len(found) % 100 == 0:
+                print(f"{len(found)} of {len(wanted)} vectors", file=sys.stderr, flush=True)
+    return found
+
+
+def _summary(vectors: Iterable[Vector]) -> str:
+    kinds = Counter((vector.kind, vector.level) for vector in vectors)
+    names = {"step": "steps", "trajectory": "trajectories", "flow": "flows"}
+    return ", ".join(f"{n} {level} {names[kind]}" for (kind, level), n in sorted(kinds.items()))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Returns:
+        0; 1 when `--check` finds a corpus that differs; 2 for bad input.
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m conformance.cases",
+        description="Make the corpus of vectors.",
+        epilog="example: python -m conformance.cases --check",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=FOLDER, metavar="DIR", help="where it goes, or is checked"
+    )
+    parser.add_argument("--check", action="store_true", help="make it, and compare with what is there")
+    parser.add_argument(
+        "--add", type=Path, metavar="FILE", help="add the questions of a file, and make no other"
+    )
+    parser.add_argument("--archive", type=Path, metavar="FILE", help="write the corpus and verify.py as .zip")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")
+    parser.add_argument("--most", type=int, metavar="N", help="at most so many vectors of each group")
+    options = parser.parse_args(arguments)
+    for name, number in (("most", options.most), ("jobs", options.jobs)):
+        if number is not None and number < 1:
+            parser.error(f"--{name} = {number}, must be >= 1")
+    try:
+        if options.archive:
+            return archive(options.archive)
+        if options.check:
+            return _check(options.out, _made(options.most, options.jobs))
+        known = [*load("stress", FOLDER), *certify_added(options.add)] if options.add else None
+        vectors = known or _made(options.most, options.jobs)
+        written = write(options.out, vectors)
+    except (BadInput, OSError) as error:
+        print(f"conformance.cases: {error}", file=sys.stderr)
+        return 2
+    print(f"corpus {written.corpus}, {written.digest[:12]}: {_summary(vectors)}")
+    return 0
+
+
+def archive(path: Path) -> int:
+    """Write the published corpus and its verifier as a zip file, and print the file's SHA-256.
+
+    The same corpus makes the same bytes: members bear no date of their own.
+    """
+    files = {f"corpus/{file.name}": file for file in sorted(FOLDER.iterdir())}
+    files |= {"verify.py": FOLDER.parent / "verify.py", "LICENSE": FOLDER.parents[1] / "LICENSE"}
+    with zipfile.ZipFile(path, "w") as members:
+        for name, file in files.items():
+            if file.is_file():
+                members.writestr(zipfile.ZipInfo(name), file.read_bytes(), zipfile.ZIP_DEFLATED, 9)
+    print(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}")
+    print(f"corpus {manifest().corpus}, digest {manifest().digest}")
+    return 0
+
+
+def _check(folder: Path, vectors: Iterable[Vector]) -> int:
+    there = {vector.id: encode([vector]) for vector in load("stress", folder)}
+    made = {vector.id: encode([vector]) for vector in vectors}
+    different = [name for name in made if there.get(name) != made[name]]
+    different += [name for name in there if name not in made]
+    for name in different:
+        print(f"{name}: differs")
+    print(f"{len(made)} vectors made, {len(different)} differ")
+    return 1 if different else 0

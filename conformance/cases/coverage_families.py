@@ -4,10 +4,9 @@ from collections.abc import Iterator
 
 import msgspec
 
-from conformance.cases.draw import Draw
+from conformance.cases.draw import Draw, Family, Question
 from conformance.cases.families import soon
 from conformance.cases.flow_families import tilted
-from conformance.cases.question import Family, Question
 from conformance.cases.scenes import MOVING, TABLES, Clock, clock, deep_wave, law, scene, state, time
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem
 from scene.geometry import rounded

@@ -13,8 +13,7 @@ import msgspec
 from mpmath import MPContext
 
 from conformance import plain
-from conformance.cases.draw import Draw, Unfit
-from conformance.cases.question import NEVER, Family, Question
+from conformance.cases.draw import NEVER, Draw, Family, Question, Unfit
 from conformance.cases.scenes import TABLES, Clock, clock, many_legs, off_its_wall, scene, state
 from scene import BangBang, Cap, Collision, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.laws import value
@@ -31,7 +30,7 @@ HARDLY = (0.0, 2.0**-52, -(2.0**-52), 2.0**-40, -(2.0**-40))  # off a floor
 LARGEST = 390  # powers of two, of units of length and time
 
 
-def beside(draw: Draw, t: float) -> float:
+def at_or_next_to(draw: Draw, t: float) -> float:
     """Draw a time, or a number next to it."""
     return math.nextafter(t, draw.pick((t, t, math.inf, -math.inf)))
 
@@ -87,7 +86,9 @@ def corner_arrival(draw: Draw) -> Question:
     vx, vy, t = (side * x - x0) / dt, (y - y0) / dt, PERIOD * draw.pick((0, 0, 1, -3, 100)) - dt
     miss = draw.pick((0.0, draw.power(-50, -26), -draw.power(-50, -26)))
     return Question(
-        of, State(t, x0 + miss, y0, vx, vy), beside(draw, t + dt) if draw.pick((False, True)) else t + 2 * dt
+        of,
+        State(t, x0 + miss, y0, vx, vy),
+        at_or_next_to(draw, t + dt) if draw.pick((False, True)) else t + 2 * dt,
     )
 
 
@@ -97,7 +98,7 @@ def hit_at_end(draw: Draw) -> Question:
     Sometimes the wall rests at a knot then, behind which is a violent leg.
     """
     dt, size, side = draw.pick(ARRIVALS), draw.pick((1.0, 1.5)), draw.pick((1.0, -1.0))
-    knot, quick, t_end = beside(draw, dt), draw.power(-40, -1), beside(draw, dt)
+    knot, quick, t_end = at_or_next_to(draw, dt), draw.power(-40, -1), at_or_next_to(draw, dt)
     law = moved(draw, size, dt)
     if draw.pick((False, True)):
         other, times = draw.between(0.3, 4.0), (0.0, knot, knot + quick, knot + quick + 1.0, PERIOD)
@@ -189,7 +190,7 @@ def tiny_slope(draw: Draw) -> Question:
     )
     turn, x = 2.0 * draw.pick((0, 0, 1, -5, 512)), half if wall == "right" else -half
     leaving = State(turn + t, x, y, 0.0, speed, wall)
-    return Question(draw.pick(tables), leaving, turn + draw.pick((3.0, beside(draw, back))))
+    return Question(draw.pick(tables), leaving, turn + draw.pick((3.0, at_or_next_to(draw, back))))
 
 
 def residual(draw: Draw) -> Question:
@@ -198,10 +199,10 @@ def residual(draw: Draw) -> Question:
     law, size = rise_and_fall(1.0, draw.pick((2.0, 1.5)), t)
     off, vx = draw.pick((0.0, 1.0, -1.0)) * draw.power(-200, -20), draw.pick((0.0, 0.25, 0.5 / (2 - 2 * t)))
     asked: tuple[tuple[Scene, State], ...] = (
-        (Cap(r=law), State(t, off, beside(draw, size), 0.0, 0.0, "arc")),
+        (Cap(r=law), State(t, off, at_or_next_to(draw, size), 0.0, 0.0, "arc")),
         (Stem(w=1.0, h=law), State(t, 0.5, draw.pick(HARDLY) - size, vx, 0.0, "floor")),
     )
-    return Question(*draw.pick(asked), draw.pick((3.0, beside(draw, 2 - t))))
+    return Question(*draw.pick(asked), draw.pick((3.0, at_or_next_to(draw, 2 - t))))
 
 
 def on_the_wall(draw: Draw) -> Question:

@@ -8,8 +8,7 @@ from functools import partial
 
 import msgspec
 
-from conformance.cases.draw import Draw
-from conformance.cases.question import Family, Question
+from conformance.cases.draw import Draw, Family, Question
 from conformance.cases.scenes import MOVING, TABLES, Clock, clock, place, scene, state, time
 from scene import Cap, Mushroom, Scene, State, Stem, from_data, load, to_data
 from scene.geometry import rounded

@@ -10,10 +10,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from conformance.cases.certify import stays
-from conformance.cases.draw import Draw
+from conformance.cases.certify import capture_intervals
+from conformance.cases.draw import Draw, Family, Mark, Question
 from conformance.cases.families import CATALOGUE, FIXED, MOVING_CAPS
-from conformance.cases.question import Family, Mark, Question
 from conformance.cases.scenes import MOVING, Clock, clock, law, scene, state, time, walls_speed
 from scene import Mushroom, Scene, State, Stem, load
 from scene.geometry import rounded
@@ -40,7 +39,7 @@ def any_marks(found: Marks) -> bool:
 
 def has_stays(number: int) -> Callable[[Marks], bool]:
     """Look for flows of so many stays, or more."""
-    return lambda found: len(stays(found)) >= number
+    return lambda found: len(capture_intervals(found)) >= number
 
 
 def has_hits(number: int) -> Callable[[Marks], bool]:
@@ -50,12 +49,12 @@ def has_hits(number: int) -> Callable[[Marks], bool]:
 
 def is_interrupted(found: Marks) -> bool:
     """Look for a stay in which an arc hit is not captured though later ones are."""
-    return any("free" in found[begin:end] for begin, end in stays(found))
+    return any("free" in found[begin:end] for begin, end in capture_intervals(found))
 
 
 def is_on_at_the_end(found: Marks) -> bool:
     """Look for a stay that is cut at t_end."""
-    return any(end == len(found) for _, end in stays(found))
+    return any(end == len(found) for _, end in capture_intervals(found))
 
 
 def _flow(draw: Draw, of: Scene, at: dict[str, Any]) -> Question:

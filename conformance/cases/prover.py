@@ -1,14 +1,16 @@
 """Certified answers of single steps: the one place that makes them from the reference's enclosures.
 
-The reference proves every answer by itself; `certify` has the verifier prove it again.
+The reference proves every answer by itself; `certify` has the verifier prove it again. At a knot of a law
+the acceleration of a wall jumps, and the derivatives with it. Rounding may put a hit on either side: the
+larger sum of both sides counts.
 """
 
 from collections.abc import Sequence
 from fractions import Fraction
+from math import fsum, inf
 from typing import NamedTuple
 
 import reference
-from conformance.grading.error import Matrix, free_flight, inputs_of, moved
 from conformance.vectors import (
     DIGITS,
     NUMBERS,
@@ -33,6 +35,7 @@ NUDGES: tuple[tuple[Level, float], ...] = (("core", 2.0**-30), ("extended", 2.0*
 CONDITIONS = {"core": 1e6, "extended": 1e12}
 # Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
 SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
+Matrix = list[list[float]]
 GUARD = 6  # decimals asked of the reference beyond those that are written down
 
 
@@ -120,7 +123,7 @@ def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> St
 
     Args:
         state: the start.
-        t_end: horizon [time]; no later time is given.
+        t_end: horizon [time]; no later time is returned.
         signs: of the moves of t, x, y, vx, vy.
         nudge: relative; to the greater component for place and velocity.
     """
@@ -149,3 +152,40 @@ def coasted(outcome: reference.Horizon, since: Ends) -> dict[str, Ends]:
 
 def _numbers(dt: Ends, after: reference.Moment) -> dict[str, Ends]:
     return {"dt": dt, **{name: ends(getattr(after, name)) for name in NUMBERS[1:]}}
+
+
+def inputs_of(state: State) -> list[float]:
+    """Return the five numbers that a step starts from: t, x, y, vx, vy."""
+    return [state.t, state.x, state.y, state.vx, state.vy]
+
+
+def moved(row: Sequence[float], inputs: Sequence[float]) -> float:
+    """Return the sum over inputs of |d out / d in| |in|, for the derivatives of one output."""
+    return fsum(abs(d * value) for d, value in zip(row, inputs, strict=True))
+
+
+def free_flight(state: State, dt: float) -> Matrix:
+    """Return the (5, 5) Jacobian of a flight up to a fixed time: dt, x, y, vx, vy by t, x, y, vx, vy."""
+    return [
+        [-1.0, 0.0, 0.0, 0.0, 0.0],
+        [-state.vx, 1.0, 0.0, dt, 0.0],
+        [-state.vy, 0.0, 1.0, 0.0, dt],
+        [0.0, 0.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 1.0],
+    ]
+
+
+def condition_number(out: Sequence[float], allowance: Sequence[float]) -> float:
+    """Return the largest relative change of an output per relative change of the inputs.
+
+    Args:
+        out: (dt, x, y, vx, vy), the exact answer rounded.
+        allowance: for each of these the sum over inputs of |d out / d in| |in|.
+
+    Returns:
+        max over outputs of (sum |d out / d in| |in|) / |out|, place and velocity taken as vectors'
+        largest components; inf when such a vector vanishes though it can move.
+    """
+    sizes = [abs(value) for value in out]
+    parts = [(max(allowance[part]), max(sizes[part])) for part in (slice(1), slice(1, 3), slice(3, 5))]
+    return max((change / size if size else (inf if change else 0.0)) for change, size in parts)

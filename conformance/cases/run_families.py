@@ -1,4 +1,4 @@
-"""Families of a run's questions: scenes that no file holds, and what chance seldom draws in them.
+"""Families of a run's questions: scenes that no file holds, and what is rare in random draws of them.
 
 Where a family is for a wall, its questions are those that meet this wall first. A returning particle leaves
 its wall slowly, off it by up to a quarter of what is allowed, and meets it again, which keeps the distance
@@ -15,9 +15,8 @@ from math import sqrt
 
 import msgspec
 
-from conformance.cases.draw import Draw, Unfit
+from conformance.cases.draw import Draw, Family, Question, Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.question import Family, Question
 from conformance.cases.scenes import (
     KINDS,
     LONGEST,
@@ -44,7 +43,6 @@ WALLS: tuple[tuple[str, Wall], ...] = tuple(
     (table.__name__.lower(), wall) for table in (Cap, Stem, Mushroom) for wall in table.walls
 )
 MOVABLE = tuple((table, wall) for table, wall in WALLS if wall != "base")
-LIKE_BEFORE = "one-law-changed"
 DEPTHS = 22, 40  # of a leaning stem, as powers of two of its width
 UNITS = -44, 44  # powers of two that lengths and times are multiplied with, at most
 
@@ -176,12 +174,7 @@ def vibrating(table: str, draw: Draw) -> Question:
 
 
 FAMILIES = (
-    Family(
-        LIKE_BEFORE,
-        "a scene is known by less than all of its laws: the question before, but for one law",
-        partial(anywhere, None, None),
-        weight=30,
-    ),
+    Family("anywhere", "a flight in a scene that no file holds", partial(anywhere, None, None), weight=30),
     *(
         Family(
             f"anywhere-{table}-{wall}",

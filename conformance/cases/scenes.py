@@ -13,15 +13,13 @@ draws again.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import msgspec
 from msgspec.structs import replace
 
 from conformance.cases.draw import Draw, Unfit
 from scene import (
-    BadInput,
     BangBang,
     Cap,
     Fourier,
@@ -31,8 +29,6 @@ from scene import (
     State,
     Stem,
     Wall,
-    from_data,
-    to_data,
 )
 from scene.geometry import TableAt, rounded
 from scene.given import MAX_KNOTS
@@ -202,33 +198,6 @@ def any_scene(draw: Draw, table: str | None = None, kinds: Sequence[str] = KINDS
         powers = {mouth: wider, "h": deeper, "slope": wider - deeper}
         found = replace(found, **{name: scaled_law(getattr(found, name), n, 0) for name, n in powers.items()})
     return replace(found, name=draw.pick(("", "", "scene", "1")))
-
-
-def wire_form(of: Scene) -> dict[str, Any]:
-    """Return a scene as JSON has it, without its name and notes."""
-    data = {key: law for key, law in to_data(of).items() if key not in ("name", "notes")}
-    decoded: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(data))  # lists for tuples
-    return decoded
-
-
-def leaves(data: Any, label: str = "") -> Iterator[tuple[str, float]]:
-    """Yield the numbers of a scene in the wire's form, each with the name of its place."""
-    if isinstance(data, dict):
-        for name, part in data.items():
-            yield from leaves(part, name)
-    elif isinstance(data, list | tuple):
-        for i, part in enumerate(data):
-            yield from leaves(part, label if isinstance(part, list | tuple) else f"{label}{min(i, 2)}")
-    elif isinstance(data, int | float):
-        yield label, float(data)
-
-
-def readable(data: dict[str, Any]) -> Scene | None:
-    """Return the scene in the wire's form; None where it is a bad one, which is to be refused."""
-    try:
-        return from_data(data)
-    except BadInput:
-        return None
 
 
 def walls_speed(scene: Scene) -> float:

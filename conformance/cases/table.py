@@ -8,7 +8,7 @@ from conformance.cases import (
     flow_families,
     run_families,
 )
-from conformance.cases.question import Family
+from conformance.cases.draw import Family
 
 FAMILIES: dict[str, Family] = {
     family.name: family

@@ -4,7 +4,15 @@ An agreement is the same outcome, the same walls in the same order, and numbers 
 a backward error of at most 1e-9, |out - truth| / (allowance + |out|). Place and velocity are each taken as a
 vector (its largest allowance and component), so that a stepper which computes normals from angles is not
 refused for 1e-17 where the exact zero is right. A caller may also bound the backward ulps of every single
-component (`grading.error`). In a trajectory all steps are held to the same bounds, with chained allowances.
+component. In a trajectory all steps are held to the same bounds, with chained allowances.
+
+The one measure of precision is backward ulps:
+
+    |out - truth| / (sum over inputs |d out / d in| |in| u + |out| u),    u = 2^-53
+
+counts how many units in the last place the inputs and the output would have to move to explain the answer.
+It is as fair to a grazing hit, where every stepper must lose digits, as to a head-on one. The sum over the
+inputs is the `allowance` that a certified answer carries (`conformance.vectors.Certified`).
 
 Both the truth and the answer may be enclosures. Numbers count as right, or as wrong, only where they are so
 for all numbers of the enclosures; else the comparison is `indeterminate`. An answer `undecided` is never
@@ -18,11 +26,12 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from conformance.grading.error import LEAST, U, backward_ulps
 from conformance.vectors import NUMBERS, Certified, Ends, Expectation
 from scene import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined, Wall
 from scene.protocol.messages import Answered, AnsweredCollision
 
+U = Fraction(1, 2**53)
+LEAST = Fraction(1, 2**1075)  # half the spacing of subnormal numbers: nothing rounds better
 BOUND = Fraction(1, 10**9)  # physics: far above rounding, far below any error of principle
 DIGITS, SHARPEST = Fraction(1, 1000), Fraction(1, 2**43)  # what passes is right to; a thousand backward ulps
 NEAR_HIT = Fraction(1, 10)  # of the flight time
@@ -115,6 +124,13 @@ class _Measured(NamedTuple):
     off: Fraction | float
 
 
+def backward_ulps(error: Fraction, size: Fraction) -> Fraction | float:
+    """Return |out - truth| in units of u times a size (allowance plus |out|), inf where only 0 is right."""
+    if not size:
+        return math.inf if error else Fraction(0)
+    return error / max(size * U, LEAST)
+
+
 def physics_bound(condition: float) -> Fraction:
     """Return the backward error that is granted as physics, for a question of some condition number.
 
@@ -193,15 +209,15 @@ def compare_arrival(
         return judged
     if (captured is None) != (not expected.stays):
         said = "none" if captured is None else f"a capture interval from {captured[0]!r} to {captured[1]!r}"
-        first = f"the stay {expected.stays[0]} of its steps" if expected.stays else "none"
+        first = f"the capture interval {expected.stays[0]} of its steps" if expected.stays else "none"
         return judged._replace(kind="numbers", why=f"captured: {said}, must be {first}")
     if captured is None:
         return judged
-    for name, given, place in zip(("begin", "end"), captured, expected.stays[0], strict=True):
+    for name, end, place in zip(("begin", "end"), captured, expected.stays[0], strict=True):
         (low, high), allowance = times[place]
-        error = max(Fraction(given) - high, low - Fraction(given), Fraction(0))
-        if error > physics * (allowance + abs(Fraction(given))):
-            why = f"captured: its {name} is {given!r}, must be {float(low)!r} (step {place + 1})"
+        error = max(Fraction(end) - high, low - Fraction(end), Fraction(0))
+        if error > physics * (allowance + abs(Fraction(end))):
+            why = f"captured: its {name} is {end!r}, must be {float(low)!r} (step {place + 1})"
             return judged._replace(kind="numbers", why=why)
     return judged
 
@@ -312,20 +328,20 @@ def _measure(
     answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str, physics: Fraction
 ) -> _Measured:
     """Measure dt (of a horizon none is given), t (but of an enclosed answer), place and velocity."""
-    numbers = _given(answer)
+    numbers = _numbers_of(answer)
     if not all(math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)):
         return _Measured(
             math.inf, math.inf, math.inf, math.inf, f"{place}a number that is not finite", math.inf
         )
-    given = {name: (Fraction(low), Fraction(high)) for name, (low, high) in numbers.items()}
+    answered = {name: (Fraction(low), Fraction(high)) for name, (low, high) in numbers.items()}
     truth = {name: certified.ends(name) for name in NUMBERS} | {"t": time[0]}
     allowances = dict(zip(NUMBERS, map(Fraction, certified.allowance), strict=True)) | {"t": time[1]}
-    sizes = {name: allowances[name] + max(map(abs, ends)) for name, ends in given.items()}
+    sizes = {name: allowances[name] + max(map(abs, ends)) for name, ends in answered.items()}
     found = _Measured(Fraction(0), Fraction(-1), Fraction(0), Fraction(0), "", Fraction(0))
     for vector in VECTORS:
-        scale = max([LEAST / U, *(sizes[name] for name in vector if name in given)])
-        for name in (name for name in vector if name in given):
-            (low, high), (certified_low, certified_high) = given[name], truth[name]
+        scale = max([LEAST / U, *(sizes[name] for name in vector if name in answered)])
+        for name in (name for name in vector if name in answered):
+            (low, high), (certified_low, certified_high) = answered[name], truth[name]
             most = max(abs(high - certified_low), abs(certified_high - low))
             least = max(certified_low - high, low - certified_high, Fraction(0))
             # An exact zero that nothing can move, as y on the base, has no size of its own to be measured by.
@@ -343,7 +359,7 @@ def _measure(
     return found
 
 
-def _given(answer: Answer) -> dict[str, tuple[Fraction | float, Fraction | float]]:
+def _numbers_of(answer: Answer) -> dict[str, tuple[Fraction | float, Fraction | float]]:
     """Return the ends of the numbers that an answer has, by name."""
     if isinstance(answer, Enclosed):
         return dict(zip(NUMBERS, answer.ends, strict=True))

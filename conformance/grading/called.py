@@ -145,7 +145,7 @@ def numbers(outcome: Outcome, state: State) -> Numbers | None:
     return None
 
 
-def measured(
+def measure_step(
     stepper: Stepper,
     scene: Scene,
     state: State,

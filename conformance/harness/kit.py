@@ -8,8 +8,8 @@ Copy this file, or import it. An engine gives one of two things:
 The kit reads the questions, keeps the horizon, names the wall (least |f| / |grad f| at the place of the hit),
 chains trajectories and flows, and times them. The plain stepper judges the states, and decides from an
 engine's crossings which wall is first; where rounding leaves two answers open it says `undecided`. So may an
-engine, by raising `Open`: a next hit does not tell how near it came to another wall, or to the horizon. What
-it returns that is no hit (nan, a time that has passed) is answered as a failure of its own.
+engine, by raising `UndecidedError`: a next hit does not tell how near it came to another wall, or to the
+horizon. What it returns that is no hit (nan, a time that has passed) is answered as a failure of its own.
 """
 
 import math
@@ -23,13 +23,13 @@ from mpmath import fp
 from msgspec.structs import replace
 
 from conformance import plain
-from conformance.plain import Flight, Open
+from conformance.plain import Flight, UndecidedError
 from scene import Collision, Horizon, Outcome, Scene, State, Wall
 from scene.geometry import table_at
 from scene.protocol.messages import Answered, AnsweredCollision
 from scene.protocol.wire import AnsweringStepper, OwnFailure, serve
 
-__all__ = ["Hit", "Open", "serve_engine", "serve_parts"]
+__all__ = ["Hit", "UndecidedError", "serve_engine", "serve_parts"]
 Hit = tuple[float, float, float, float, float]  # t, x, y, vx, vy, after the bounce
 NextHit = Callable[[Scene, State], Hit | None]
 # (scene, wall, state, after, until) -> the first s, after < s <= until, at which the wall's f falls through
@@ -54,7 +54,7 @@ def serve_engine(name: str, next_hit: NextHit) -> None:
             if refusal := self.refusal():
                 return refusal
             if self.wall is None and self.y == self.vy == 0:
-                raise Open("it flies along the mouth")
+                raise UndecidedError("it flies along the mouth")
             answer = _answer_of(next_hit, self.scene, _leaving(self), self.t_end)
             if isinstance(answer, AnsweredCollision):
                 self.require_alone(answer)
@@ -64,7 +64,7 @@ def serve_engine(name: str, next_hit: NextHit) -> None:
             other = table_at(fp, self.scene, hit.t).nearest_wall(hit.x, hit.y, but=hit.wall)
             s = hit.t - self.state.t
             if abs(self.f(other, s)[0]) <= self.noise(other, s):
-                raise Open(f"{hit.wall} and {other} are met at once, within rounding")
+                raise UndecidedError(f"{hit.wall} and {other} are met at once, within rounding")
 
     _serve(name, partial(plain.next_collision, flight=Question))
 

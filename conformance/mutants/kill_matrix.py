@@ -4,9 +4,13 @@
 writes kill-matrix.json beside this file, with a few vectors for each mutant: some five minutes on one core.
 `--table` computes nothing and prints what is kept there as Markdown. Only `fail` kills: a vector that a
 mutant declines, or at which it crashes, does not count.
+
+A diagnosis of a run names the mutants, common mistakes included, that fail most like it. They answer a sample
+of its failures and passes, unless the few vectors by which the matrix tells them from others all passed.
 """
 
 import json
+import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -20,7 +24,7 @@ from conformance.mutants import COMMON, MUTANTS, PLAIN, Mutant
 from conformance.vectors import LEVELS, Vector, answer, load, manifest
 from scene import BadInput
 
-DATA = Path(__file__).parent  # it ships with the package: `suite.diagnosis` reads it
+DATA = Path(__file__).parent  # the matrix ships with the package
 MOST_VECTORS = 3  # kept of those that kill a mutant
 LEAST_COMPARED = 5  # vectors: what fewer kill shows too little to call other mutants needless
 HEAD = """# Kill matrix
@@ -34,6 +38,12 @@ threshold from which on a mistake shows.
 | mutant | what it does wrong | size | kills | some vectors that kill it |
 | --- | --- | ---: | ---: | --- |
 """
+N_COMPARED = 20  # failures of a run, and as many passes
+# Groups that take the plain stepper long: they are compared only where no other failed.
+SLOW = ("waiting", "hard-case-22", "long-trajectory", "long-flow", "longest-flow")
+ALIKE = 0.5  # least correlation of two verdicts over the vectors that were asked
+NEARLY = 0.9  # of the likest one's correlation, that another must have to be named beside it
+MAX_NAMED = 3
 _graded: dict[tuple[str, bytes], str] = {}
 
 
@@ -52,6 +62,53 @@ def verdict(mutant: Mutant, vector: Vector) -> str:
 def kills(vectors: Sequence[Vector], mutant: Mutant) -> list[str]:
     """Return the ids of the vectors that kill a mutant, in the order of the corpus."""
     return [vector.id for vector in vectors if verdict(mutant, vector) == "fail"]
+
+
+def diagnose(failed: Sequence[Vector], passed: Sequence[Vector]) -> list[str]:
+    """Name the mutants that fail most like a run, one line each, the likest first; none without a likeness.
+
+    Args:
+        failed: the vectors that a run's implementation failed.
+        passed: those that it passed. Where nothing passed, every mutant that has the same vectors wrong is
+            as like as any other.
+    """
+    if not failed or not passed:
+        return []
+    matrix = json.loads((DATA / "kill-matrix.json").read_bytes())["mutants"]
+    ids_failed, ids_passed = ({vector.id for vector in vectors} for vectors in (failed, passed))
+    some_failed, some_passed = _sample(failed), _sample(passed)
+    lines: dict[str, str] = {}
+    scores: dict[str, float] = {}
+    for name, mutant in (MUTANTS | COMMON).items():
+        own = set(matrix[name]["vectors"])
+        if own & ids_passed and not own & ids_failed:
+            continue
+        alike, unlike = len(kills(some_failed, mutant)), len(kills(some_passed, mutant))
+        shares = alike / len(some_failed), unlike / len(some_passed)
+        scores[name] = _correlation(len(failed), len(passed), *shares)
+        lines[name] = (
+            f"like {name} on {alike} of {len(some_failed)} failures, and unlike it on {unlike} of"
+            f" {len(some_passed)} passes: {mutant.fault}"
+        )
+    likest = sorted(scores, key=lambda name: -scores[name])[:MAX_NAMED]
+    return [lines[name] for name in likest if scores[name] >= max(ALIKE, NEARLY * scores[likest[0]])]
+
+
+def _sample(vectors: Sequence[Vector]) -> list[Vector]:
+    """Return N_COMPARED vectors, spread over all that are quick, or of all there are."""
+    some = [vector for vector in vectors if vector.group not in SLOW] or vectors
+    n = min(N_COMPARED, len(some))
+    return [some[i * len(some) // n] for i in range(n)]
+
+
+def _correlation(n_failed: int, n_passed: int, of_failed: float, of_passed: float) -> float:
+    """Return the correlation of a run's failures with a mutant's, by its shares of failures and of passes.
+
+    What neither fails counts too: else a mutant that fails everything would be like all that fail much.
+    """
+    n, killed = n_failed + n_passed, n_failed * of_failed + n_passed * of_passed
+    spread = math.sqrt(n_failed * n_passed * killed * (n - killed))
+    return n_failed * (n * of_failed - killed) / spread if spread else 0.0
 
 
 def subsumed(found: dict[str, list[str]]) -> dict[str, str]:
@@ -93,8 +150,8 @@ def page(published: dict[str, Any]) -> str:
         entries, key=lambda name: (bool(entries[name]["subsumed_by"]), entries[name]["kills"])
     ):
         entry = entries[name]
-        who = f"{name} ({entry['subsumed_by']})" if entry["subsumed_by"] else name
-        cells = who, entry["fault"].replace("|", "\\|"), entry["size"] or "", entry["kills"]
+        label = f"{name} ({entry['subsumed_by']})" if entry["subsumed_by"] else name
+        cells = label, entry["fault"].replace("|", "\\|"), entry["size"] or "", entry["kills"]
         lines.append(f"| {' | '.join(map(str, cells))} | {', '.join(entry['vectors'])} |")
     return "\n".join(lines) + "\n"
 

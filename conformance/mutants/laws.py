@@ -22,7 +22,7 @@ from scene.tables import laws
 
 
 def single(x: float) -> float:
-    """Round to binary32, as one who declares a float does."""
+    """Round to binary32, as a variable declared as float does."""
     return float(struct.unpack("f", struct.pack("f", max(-3e38, min(x, 3e38))))[0])
 
 

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from conformance.mutants.laws import single
 from conformance.mutants.mutant import Plain, mutant
-from conformance.plain.flow import PlainPath, Stay, misses_mouth, width
+from conformance.plain.flow import CaptureInterval, PlainPath, misses_mouth, width
 from conformance.plain.step import Flight
 from scene import Collision, Mushroom, Outcome, State
 from scene.protocol.wire import Captured
@@ -15,7 +15,7 @@ from scene.tables import laws
 Arrival = tuple[Outcome, Captured]
 
 
-@mutant(PlainPath, "told")
+@mutant(PlainPath, "report")
 def speed_drifts_after_five_hundred_hits(
     path: PlainPath, plain: Plain[Collision], hit: Collision, *, size: float = 500
 ) -> Collision:
@@ -24,7 +24,7 @@ def speed_drifts_after_five_hundred_hits(
     return replace(hit, vx=kept * hit.vx, vy=kept * hit.vy)
 
 
-@mutant(PlainPath, "told")
+@mutant(PlainPath, "report")
 def energy_frozen_after_fifty_hits(
     path: PlainPath, plain: Plain[Collision], hit: Collision, *, size: float = 50
 ) -> Collision:
@@ -101,7 +101,7 @@ def capture_ends_for_good_at_free_hit(path: PlainPath, plain: Plain[None], hit: 
 def capture_ends_below_only(path: PlainPath, plain: Plain[None], hit: Collision) -> None:
     """Lets a capture go on through arc hits that are not captured, until a wall of the stem is met."""
     plain(hit)
-    path.stay = Stay(path.stay.begin)
+    path.stay = CaptureInterval(path.stay.begin)
 
 
 class Remembering(PlainPath):
@@ -116,7 +116,7 @@ def capture_begins_with_the_hit_before(path: Remembering, plain: Plain[None], hi
     is_free = path.stay.begin is None
     plain(hit)
     if is_free and path.stay.begin is not None and path.before is not None:
-        path.stay = Stay(path.before)
+        path.stay = CaptureInterval(path.before)
     path.before = hit.t if hit.wall == "arc" else path.before
 
 
@@ -126,7 +126,7 @@ def capture_begins_at_the_start(path: PlainPath, plain: Plain[None], hit: Collis
     begin, is_free = path.state.t, path.stay.begin is None
     plain(hit)
     if path.n_hits == 1 and is_free and path.stay.begin is not None:
-        path.stay = Stay(begin)
+        path.stay = CaptureInterval(begin)
 
 
 @mutant(PlainPath, "arrival")

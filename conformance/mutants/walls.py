@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from conformance.mutants.mutant import COMMON, Plain, mutant
 from conformance.plain.motion import ConstantMotion, LawValue
-from conformance.plain.step import Flight, Gap, Open
+from conformance.plain.step import Flight, Gap, UndecidedError
 from scene import Collision, Mushroom, Outcome, Scene, State, Wall
 
 Normal = tuple[float, float, float]
@@ -21,7 +21,7 @@ class Heedless(Flight):
         """Return the first root, or None where it is open."""
         try:
             return super().first_root(wall, start, end)
-        except Open:
+        except UndecidedError:
             return None
 
     def require_clear(self, walls: Sequence[Wall], s: float) -> None:

@@ -24,7 +24,7 @@ class PlainPath:
     def __init__(self, scene: Scene, state: State, t_end: float, step: Stepper = next_collision) -> None:
         self.scene, self.state, self.t_end, self.step = scene, state, t_end, step
         self.n_hits = 0
-        self.stay = Stay()
+        self.stay = CaptureInterval()
         self.stays: list[tuple[float, float]] = []
 
     def advance(self) -> Outcome:
@@ -32,13 +32,13 @@ class PlainPath:
         outcome = self.step(self.scene, self.state, self.t_end)
         if isinstance(outcome, Collision):
             self.n_hits += 1
-            outcome = self.told(outcome)
+            outcome = self.report(outcome)
             self.watch(outcome)
             self.state = self.departure(outcome)
         return outcome
 
-    def told(self, hit: Collision) -> Collision:
-        """Return a collision as it is told, and gone on from."""
+    def report(self, hit: Collision) -> Collision:
+        """Return a collision as it is answered, and gone on from."""
         return hit
 
     def departure(self, hit: Collision) -> State:
@@ -56,14 +56,14 @@ class PlainPath:
         """End the stay, if one is on, when a wall of the stem is met or at t_end."""
         if (stay := self.stay.until(t)) is not None:
             self.stays.append(stay)
-        self.stay = Stay()
+        self.stay = CaptureInterval()
 
     def is_captured(self, scene: Mushroom, hit: Collision) -> bool:
         """Tell whether |sin phi_hat| > nu: the chord to an arc hit keeps further from the centre than w."""
         return misses_mouth(width(scene, hit.t), hit, self.state.vx, self.state.vy)
 
     def arrival(self) -> tuple[Outcome, Captured]:
-        """Carry the particle to t_end, and return its first capture interval too; who is lost tells none."""
+        """Carry the particle to t_end, and return its first capture interval; a lost particle has none."""
         for _ in range(self.most):
             outcome = self.advance()
             if not isinstance(outcome, Collision):
@@ -76,17 +76,17 @@ class PlainPath:
         return outcome, self.stays[0] if self.stays else None
 
 
-class Stay(NamedTuple):
+class CaptureInterval(NamedTuple):
     """What is known of a capture interval: its first captured arc hit, and the first after its last one."""
 
     begin: float | None = None
     end: float | None = None
 
-    def after(self, t: float, is_captured: bool) -> "Stay":
+    def after(self, t: float, is_captured: bool) -> "CaptureInterval":
         """Return the stay after an arc hit: uncaptured hits between captured ones do not divide it."""
         if is_captured:
-            return Stay(t if self.begin is None else self.begin)
-        return Stay(self.begin, t) if self.begin is not None and self.end is None else self
+            return CaptureInterval(t if self.begin is None else self.begin)
+        return CaptureInterval(self.begin, t) if self.begin is not None and self.end is None else self
 
     def until(self, t: float) -> Captured:
         """Return the stay that ends at t, if it did not before; None where there is none."""

@@ -54,8 +54,8 @@ class Gap(NamedTuple):
     fy: float
 
 
-class Open(Exception):  # noqa: N818 (a question left open is no error)
-    """Rounding, or the limit on work, leaves it open."""
+class UndecidedError(Exception):
+    """Rounding, or the limit on work, leaves two answers possible."""
 
 
 class Flight:
@@ -98,7 +98,7 @@ class Flight:
             return Undefined("mouth-edge") if hit else self.horizon()
         near = self.walls_near(in_cap=self.is_in_cap)
         if self.is_horizon and abs(self.crossing - self.end) <= ROUNDING * self.end:
-            raise Open("y = 0 is crossed at t_end within rounding")
+            raise UndecidedError("y = 0 is crossed at t_end within rounding")
         hit = self.first_hit(near, 0.0, min(self.crossing, self.end))
         if hit is None and self.crossing < self.end:
             self.require_clear(near, self.crossing)
@@ -111,7 +111,7 @@ class Flight:
             near = (*near, "base")  # a tie of hit and crossing is a corner
         if not self.is_horizon:
             self.require_clear(near, 0.0)
-        elif hit is None or hit[1] > self.end / 2:  # who has met a wall long before is not there at t_end
+        elif hit is None or hit[1] > self.end / 2:  # a wall met long before keeps it from there at t_end
             self.require_clear(near, self.end)
         if hit is None:
             return self.horizon()
@@ -145,7 +145,7 @@ class Flight:
     def first_root(self, wall: Wall, start: float, end: float) -> float | None:
         """Return the first s at which f turns negative, proved first by the bound on f''."""
         if wall == "arc" and min(self.bounds["r"].highest, hypot(self.vx, self.vy) or LEAST) < LEAST:
-            raise Open("the cap is smaller, or the particle slower, than 2^-500: squares vanish")
+            raise UndecidedError("the cap is smaller, or the particle slower, than 2^-500: squares vanish")
         bend = self.bend(wall)
         if wall == self.wall:  # f(s) >= f'(0) s - bend s^2 / 2 > 0 up to twice this time
             start = max(start, self.f(wall, 0.0)[1] / bend if bend else inf)
@@ -157,7 +157,7 @@ class Flight:
             middle, width = (a + b) / 2, b - a
             fa, fb = self.f(wall, a)[0], self.f(wall, b)[0]
             if fa <= 0:
-                raise Open(f"f of {wall} has no sign where it should be positive")
+                raise UndecidedError(f"f of {wall} has no sign where it should be positive")
             noise = self.noise(wall, b)
             if min(fa, fb) > bend * width * width / 8 + noise:
                 continue
@@ -174,7 +174,7 @@ class Flight:
             if not a < middle < b:
                 break
             parts += [(middle, b), (a, middle)]
-        raise Open(
+        raise UndecidedError(
             f"no hit of {wall} is proved or excluded: f and f' vanish together, or there is too much to do"
         )
 
@@ -283,8 +283,8 @@ class Flight:
             is_there = wall != self.wall or s > 0
             if is_there and abs(self.f(wall, s)[0]) <= self.noise(wall, s):
                 if s == 0:
-                    raise Open(placed(self.scene, self.state, wall, "within rounding of"))
-                raise Open(f"at s = {s!r} the particle is on wall {wall} within rounding")
+                    raise UndecidedError(placed(self.scene, self.state, wall, "within rounding of"))
+                raise UndecidedError(f"at s = {s!r} the particle is on wall {wall} within rounding")
 
     def escape(self) -> float:
         """Return a time by which no table is large enough to have kept the particle."""
@@ -387,7 +387,7 @@ def next_collision(scene: Scene, state: State, t_end: float, flight: type[Flight
         return flight(scene, state, t_end).outcome()
     except InvalidState as error:
         return Rejected(str(error))
-    except Open as question:
+    except UndecidedError as question:
         return Undecided(str(question))
     except OverflowError:
         return Undecided("a number overflows")

@@ -16,7 +16,7 @@ from typing import Any, get_args
 import msgspec
 from mpmath import fp
 
-from conformance.suite.process import Trouble, clean, shown
+from conformance.suite.process import CheckFailure, clean, excerpt
 from scene import Collision, Outcome, from_data
 from scene.geometry import table_at
 from scene.protocol.messages import (
@@ -54,14 +54,16 @@ def read_introduction(line: bytes) -> Introduction:
     """Decode the answer to `start`.
 
     Raises:
-        Trouble: wrong-format.
+        CheckFailure: wrong-format.
     """
     introduction: Introduction = _read("start", line, Introduction)
     if introduction.protocol != PROTOCOL:
-        raise Trouble("wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}")
+        raise CheckFailure(
+            "wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}"
+        )
     texts = {name: clean(getattr(introduction, name)) for name in ("name", "version", "language")}
     lists = {name: getattr(introduction, name)[:MAX_OFFERED] for name in ("profiles", "tables", "laws")}
-    offered = {name: tuple(map(clean, given)) for name, given in lists.items()}
+    offered = {name: tuple(map(clean, words)) for name, words in lists.items()}
     return msgspec.structs.replace(introduction, **texts, **offered)
 
 
@@ -69,14 +71,14 @@ def check_echo(values: Sequence[float], line: bytes) -> None:
     """Compare an echo bit for bit.
 
     Raises:
-        Trouble: wrong-format, naming the first number that differs.
+        CheckFailure: wrong-format, naming the first number that differs.
     """
     echoed: Sequence[float] = _read("echo", line, Echoed).values
     if len(echoed) != len(values):
-        raise Trouble("wrong-format", f"echo: {len(echoed)} numbers came back of {len(values)}")
+        raise CheckFailure("wrong-format", f"echo: {len(echoed)} numbers came back of {len(values)}")
     for i, (sent, came) in enumerate(zip(values, echoed, strict=True)):
         if struct.pack("<d", sent) != struct.pack("<d", came):
-            raise Trouble("wrong-format", f"echo: values[{i}] = {sent!r} came back as {came!r}")
+            raise CheckFailure("wrong-format", f"echo: values[{i}] = {sent!r} came back as {came!r}")
 
 
 def read_answer(line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = False) -> dict[str, Any]:
@@ -92,14 +94,14 @@ def read_answer(line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = F
         The answer as plain data, without its seq: an outcome, what the command asks for, or an error.
 
     Raises:
-        Trouble: wrong-format, naming the field.
+        CheckFailure: wrong-format, naming the field.
     """
     envelope: _Envelope = _read(cmd, line, _Envelope)
     is_null = may_be_null and envelope.seq is None
     if not is_null and (type(envelope.seq) not in (int, float) or envelope.seq != seq):
         said = f": {str(envelope.reason)[:200]}" if envelope.reason else ""
-        given = repr(envelope.seq)[:40]
-        raise Trouble("wrong-format", f"answered seq {given} to seq {seq}{said}")
+        answered = repr(envelope.seq)[:40]
+        raise CheckFailure("wrong-format", f"answered seq {answered} to seq {seq}{said}")
     # A failure that is owned to is the whole answer, whatever stands beside it.
     own = Answered if envelope.outcome is not None else ANSWERS[cmd]
     data: dict[str, Any] = msgspec.to_builtins(
@@ -124,15 +126,15 @@ def read_outcome(answer: Mapping[str, Any], t: float = 0.0) -> Outcome:
         t: when the flight began, for a collision that does not tell its flight time.
 
     Raises:
-        Trouble: error, when that is the answer; wrong-format, for a collision that names no wall.
+        CheckFailure: error, when that is the answer; wrong-format, for a collision that names no wall.
     """
     if "error" in answer:
-        raise Trouble("error", answer["error"])
+        raise CheckFailure("error", answer["error"])
     answered: Answered = msgspec.convert(answer, Answered)
     if not isinstance(answered, AnsweredCollision):
         return answered
     if answered.wall is None:
-        raise Trouble("wrong-format", "`wall` is missing")
+        raise CheckFailure("wrong-format", "`wall` is missing")
     dt = answered.t - t if answered.dt is None else answered.dt
     return Collision(answered.wall, dt, answered.t, answered.x, answered.y, answered.vx, answered.vy)
 
@@ -191,7 +193,7 @@ def _whole(value: Any) -> Any:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def _unreadable(cmd: str, error: Exception, line: bytes) -> Trouble:
+def _unreadable(cmd: str, error: Exception, line: bytes) -> CheckFailure:
     """Say what is wrong with a line, and show it from its beginning, or where it is no JSON."""
     try:
         msgspec.json.decode(line)
@@ -200,5 +202,5 @@ def _unreadable(cmd: str, error: Exception, line: bytes) -> Trouble:
     except UNREADABLE:
         pass
     place = re.search(r"\(byte (\d+)\)$", str(error))
-    excerpt = shown(line, at=int(place[1]) if place else 0)
-    return Trouble("wrong-format", f"{cmd}: {clean(str(error)).replace('$.', '')[:200]} in {excerpt}")
+    part = excerpt(line, at=int(place[1]) if place else 0)
+    return CheckFailure("wrong-format", f"{cmd}: {clean(str(error)).replace('$.', '')[:200]} in {part}")

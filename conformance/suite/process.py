@@ -129,7 +129,7 @@ NOT_NUMBERS = (ArithmeticError, ValueError)
 MAX_TEXT = 500  # characters kept of a reason, a name, or another text that came from it
 
 
-class Trouble(Exception):  # noqa: N818 (the implementation's trouble, not this program's)
+class CheckFailure(Exception):  # noqa: N818 (a finding about the stepper)
     """No usable answer: the verdict it gets (crashed, timed-out, wrong-format, error) and why."""
 
     def __init__(self, verdict: str, why: str) -> None:
@@ -205,7 +205,7 @@ class Process:
             timeout: seconds until the answer must be complete.
 
         Raises:
-            Trouble: crashed, timed-out, or wrong-format for more or other output than one line.
+            CheckFailure: crashed, timed-out, or wrong-format for more or other output than one line.
         """
         deadline = time.monotonic() + timeout
         self._advance(b"", 0.0)
@@ -213,26 +213,28 @@ class Process:
         pending = line + b"\n"
         while b"\n" not in self._received:
             if len(self._received) > MAX_LINE:
-                raise Trouble("wrong-format", f"its line is longer than {MAX_LINE} bytes")
+                raise CheckFailure("wrong-format", f"its line is longer than {MAX_LINE} bytes")
             left = deadline - time.monotonic()
             if left <= 0:
-                begun = f", after {shown(self._received)}" if self._received else ""
+                begun = f", after {excerpt(self._received)}" if self._received else ""
                 hint = "is each line flushed? --timeout and --total allow more"
-                raise Trouble("timed-out", f"no answer within {timeout:g} s{begun}; {hint}")
+                raise CheckFailure("timed-out", f"no answer within {timeout:g} s{begun}; {hint}")
             if not self._is_open or (self._has_exited() and not self._is_readable()):
-                raise Trouble("crashed", self._ending())
+                raise CheckFailure("crashed", self._ending())
             pending = self._advance(pending, min(left, POLL))
         answer, _, rest = bytes(self._received).partition(b"\n")
         self._received.clear()
         if rest:
-            raise Trouble("wrong-format", f"wrote more than one line: {shown(answer)} and {shown(rest)}")
+            raise CheckFailure(
+                "wrong-format", f"wrote more than one line: {excerpt(answer)} and {excerpt(rest)}"
+            )
         return answer
 
     def finish(self, line: bytes, timeout: float) -> None:
         """Write a last line and see the process end by itself, silently.
 
         Raises:
-            Trouble: wrong-format for further output, timed-out, crashed, or fail for what it leaves behind.
+            CheckFailure: wrong-format for further output, timed-out, crashed; fail for a process left behind.
         """
         deadline = time.monotonic() + timeout
         pending = line + b"\n"
@@ -245,12 +247,12 @@ class Process:
                 self._stdin.close()
         self._check_silence()
         if not self._has_exited():
-            raise Trouble("timed-out", f"still running {timeout:g} s after `stop`")
+            raise CheckFailure("timed-out", f"still running {timeout:g} s after `stop`")
         if status := self._status():
-            raise Trouble("crashed", f"{status} after `stop`")
+            raise CheckFailure("crashed", f"{status} after `stop`")
         # A helper that ends because the process has ended does so a little later.
         if not _comes_true(lambda: not self._descendants.alive()):
-            raise Trouble("fail", "left a child process running after `stop`")
+            raise CheckFailure("fail", "left a child process running after `stop`")
         self._advance(b"", 0.0)
         self._check_silence()  # of the helpers
 
@@ -265,7 +267,7 @@ class Process:
 
     def _check_silence(self) -> None:
         if self._received:
-            raise Trouble("wrong-format", f"wrote without being asked: {shown(self._received)}")
+            raise CheckFailure("wrong-format", f"wrote without being asked: {excerpt(self._received)}")
 
     def _advance(self, pending: bytes, timeout: float) -> bytes:
         # One look at all pipes; returns what is still to be written.
@@ -348,7 +350,7 @@ def escaped(text: str, kept: str = "") -> str:
     )
 
 
-def shown(data: bytes | bytearray, n: int = 60, at: int = 0) -> str:
+def excerpt(data: bytes | bytearray, n: int = 60, at: int = 0) -> str:
     """Return n bytes of what was received, the beginning or those around a place, readable on one line."""
     begin = max(0, at - n // 2)
     text = bytes(data[begin : begin + n]).decode("utf-8", "backslashreplace")

@@ -9,10 +9,10 @@ import pytest
 
 from conformance import suite, vectors
 from conformance.suite.checks import checks_of
-from conformance.suite.disguise import Disguise, drawn_disguise
-from conformance.suite.process import CommandNotFound, Trouble
+from conformance.suite.process import CheckFailure, CommandNotFound
 from conformance.suite.run import NEW_SEEDS
 from conformance.suite.session import Limits, Session
+from conformance.suite.symmetry import Transform, draw_transform
 from conformance.vectors import Vector
 from scene.refusal import BadInput, check_seed
 
@@ -22,26 +22,26 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("mushrooms")
     group.addoption("--mushrooms-command", metavar="COMMAND", help="A stepper that speaks protocol 1.")
     group.addoption("--mushrooms-level", default="core", choices=vectors.LEVELS, help="Hardest level asked.")
-    group.addoption("--mushrooms-seed", type=int, help="Of the disguises; a new one each run, printed.")
+    group.addoption("--mushrooms-seed", type=int, help="Of all random choices; a new one each run, printed.")
     group.addoption("--mushrooms-timeout", default=120.0, type=float, help="Seconds for one answer.")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Refuse bad options, and draw a seed where none is given, the same for every worker of a run."""
-    given = config.option
-    if given.mushrooms_seed is None:
+    options = config.option
+    if options.mushrooms_seed is None:
         inherited = getattr(config, "workerinput", {}).get("mushrooms_seed")
-        given.mushrooms_seed = secrets.randbelow(NEW_SEEDS) if inherited is None else inherited
+        options.mushrooms_seed = secrets.randbelow(NEW_SEEDS) if inherited is None else inherited
     try:
-        check_seed(given.mushrooms_seed, "--mushrooms-seed")
+        check_seed(options.mushrooms_seed, "--mushrooms-seed")
     except BadInput as error:
         raise pytest.UsageError(str(error)) from None
-    if not given.mushrooms_timeout > 0:
-        raise pytest.UsageError(f"--mushrooms-timeout = {given.mushrooms_timeout}, must be above 0 seconds")
+    if not options.mushrooms_timeout > 0:
+        raise pytest.UsageError(f"--mushrooms-timeout = {options.mushrooms_timeout}, must be above 0 seconds")
     try:
-        shlex.split(given.mushrooms_command or "")
+        shlex.split(options.mushrooms_command or "")
     except ValueError as error:
-        raise pytest.UsageError(f"--mushrooms-command = {given.mushrooms_command!r}: {error}") from None
+        raise pytest.UsageError(f"--mushrooms-command = {options.mushrooms_command!r}: {error}") from None
 
 
 def pytest_report_header(config: pytest.Config) -> str:
@@ -66,9 +66,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 @pytest.fixture
-def mushrooms_disguise(request: pytest.FixtureRequest, mushrooms_vector: Vector) -> Disguise:
-    """Return the disguise in which a vector is asked."""
-    return drawn_disguise(mushrooms_vector, request.config.option.mushrooms_seed)
+def mushrooms_transform(request: pytest.FixtureRequest, mushrooms_vector: Vector) -> Transform:
+    """Return the symmetry transform by which a vector is asked."""
+    return draw_transform(mushrooms_vector, request.config.option.mushrooms_seed)
 
 
 @pytest.fixture(scope="session")
@@ -82,6 +82,6 @@ def mushrooms_session(request: pytest.FixtureRequest) -> Iterator[Session]:
         try:
             session.start()
             session.probe()
-        except (CommandNotFound, Trouble) as trouble:
-            pytest.fail(str(trouble), pytrace=False)
+        except (CommandNotFound, CheckFailure) as failure:
+            pytest.fail(str(failure), pytrace=False)
         yield session

@@ -1,27 +1,27 @@
-"""Vectors and checks as pytest cases, for those who prefer `pytest` to `mushrooms check`: one test for each.
+"""Vectors and checks as pytest cases, in place of `mushrooms check`: one test for each.
 
     pytest -p conformance.suite.pytest_plugin --pyargs conformance.suite.pytest_suite \
         --mushrooms-command ./my_stepper
 
 `--mushrooms-level` is core, extended or stress, `--mushrooms-timeout` the seconds for one answer, and
-`--mushrooms-seed` repeats a run's disguises; pytest prints it. Declined and unsupported cases are skipped
-with their reason. Not here: drawn questions, speed, known failures (use `-k` and `--deselect`), the limit on
-how many cases may be declined.
+`--mushrooms-seed` repeats a run's symmetry transforms; pytest prints it. Declined and unsupported cases are
+skipped with their reason. Not here: fresh questions, speed, known failures (use `-k` and `--deselect`), the
+limit on how many cases may be declined.
 """
 
 import pytest
 
 from conformance import suite
 from conformance.suite.checks import SuiteCheck, run_check
-from conformance.suite.disguise import Disguise
 from conformance.suite.result import Result
 from conformance.suite.session import Session
+from conformance.suite.symmetry import Transform
 from conformance.vectors import Vector
 
 
-def test_vector(mushrooms_session: Session, mushrooms_vector: Vector, mushrooms_disguise: Disguise) -> None:
+def test_vector(mushrooms_session: Session, mushrooms_vector: Vector, mushrooms_transform: Transform) -> None:
     """Grade one answer."""
-    _report(suite.ask_vector(mushrooms_session, mushrooms_vector, mushrooms_disguise), mushrooms_vector.rule)
+    _report(suite.ask_vector(mushrooms_session, mushrooms_vector, mushrooms_transform), mushrooms_vector.rule)
 
 
 def test_check(mushrooms_session: Session, mushrooms_check: SuiteCheck, pytestconfig: pytest.Config) -> None:

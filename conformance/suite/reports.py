@@ -208,14 +208,14 @@ def to_badge(run: Run) -> str:
 
 
 def to_summary(run: Run) -> bytes:
-    """Return the summary as JSON: who, verdict, scope, counts, speed, and what shields.io asks for."""
-    who = run.introduction
+    """Return the summary as JSON: stepper, verdict, scope, counts, speed, and what shields.io asks for."""
+    stepper = run.introduction
     found: dict[str, Any] = {
         "schemaVersion": 1,
         "label": LABEL,
         "message": _message(run),
         "color": COLOURS[run.verdict()].removeprefix("#"),
-        "implementation": None if who is None else [who.name, who.version, who.language],
+        "implementation": None if stepper is None else [stepper.name, stepper.version, stepper.language],
         "verdict": run.verdict(),
         "line": str(run.scope()),
         "scope": run.scope(),

@@ -1,12 +1,11 @@
 """The suite: puts every question to one implementation and collects the verdicts.
 
 First the protocol itself (start, the number-transport probe, bad input), then the vectors up to a level,
-each in disguise (`suite.disguise`), and questions that no file holds, of scenes in the corpus and of others
-(`cases.generated`); then the exact properties and the
-statistical profiles, then its speed where it offers `time`, then `stop`. What ends the session is the verdict
-of every case not reached; what the implementation does not offer is `unsupported`. Verdicts follow from the
-implementation, the level and the seed, not from the machine or its load, but for time limits and what holds
-`time` to a clock.
+each as an image of itself (`suite.symmetry`), and questions that no file holds (`cases.generated`); then the
+exact properties and the statistical profiles, then its speed where it offers `time`, then `stop`. What ends
+the session is the verdict of every case not reached; what the implementation does not offer is `unsupported`.
+Verdicts follow from the implementation, the level and the seed, not from the machine or its load, but for
+time limits and what holds `time` to a clock.
 """
 
 import itertools
@@ -25,21 +24,13 @@ from conformance import vectors
 from conformance.cases.generated import FRESH, ROUND, fresh
 from conformance.grading.agreement import Agreement, middle
 from conformance.grading.grade import grade
+from conformance.mutants.kill_matrix import diagnose
 from conformance.suite.answers import outcomes_of
 from conformance.suite.checks import GROUPS, Implementation, checks_of, run_check, timing
-from conformance.suite.diagnosis import diagnose
-from conformance.suite.disguise import (
-    DRAWN,
-    N_DRAWN,
-    Disguise,
-    asked,
-    drawn_disguise,
-    drawn_horizons,
-    published,
-)
-from conformance.suite.process import NOT_NUMBERS, Trouble
+from conformance.suite.process import NOT_NUMBERS, CheckFailure
 from conformance.suite.result import BAD, Result, Run, Speed, graded_parts
 from conformance.suite.session import AnswerLine, Limits, Session, missing
+from conformance.suite.symmetry import Transform, draw_transform
 from conformance.vectors import Vector
 from scene import BadInput, State, load, to_data
 from scene.refusal import check_seed
@@ -51,7 +42,7 @@ TIMED_SCENE, TIMED_STATE = "moving-cap", State(0.0, 0.1, 0.2, 300.0, 400.0)
 TIMED_MOST = 2.0  # seconds, after which no longer trajectory is asked
 TIMED_REPEATS, TIMED_LEAST = 5, 20_000_000  # timings; nanoseconds that each must last to be read from a clock
 PROTOCOL_CASES = ("start", "echo", "rejects", "stop")
-OTHER_GROUPS = (DRAWN, FRESH, *GROUPS)
+OTHER_GROUPS = (FRESH, *GROUPS)
 OTHER_CASES = (
     *(f"protocol/{name}" for name in PROTOCOL_CASES),
     *(each.name for each in checks_of()),
@@ -101,7 +92,7 @@ class RunQuestions:
 
     Attributes:
         chosen: the vectors that files hold.
-        drawn, fresh: those of this seed.
+        fresh: those of this seed.
         checks: further questions.
         is_whole: whether no group is left out.
         n: number of cases, the protocol's own left out.
@@ -114,15 +105,14 @@ class RunQuestions:
         self.level, self.seed = level, check_seed(seed)
         parts = tuple(groups) or OTHER_GROUPS
         n_fresh = N_FRESH[level] if FRESH in parts else 0
-        self.drawn = drawn_horizons(vectors.load("core"), seed) if DRAWN in parts else []
         self.fresh: Iterable[Vector] = fresh(seed, n_fresh) if proved is None else proved
         self.checks = [each for each in checks_of(level) if each.name.startswith(parts)]
-        self.n = len(self.chosen) + len(self.drawn) + n_fresh + len(self.checks)
+        self.n = len(self.chosen) + n_fresh + len(self.checks)
 
-    def vectors(self) -> Iterator[tuple[Vector, Disguise]]:
+    def vectors(self) -> Iterator[tuple[Vector, Transform]]:
         """Return the vectors in the order of a run, each with its image."""
-        every = itertools.chain(self.chosen, self.drawn, self.fresh)
-        return ((vector, drawn_disguise(vector, self.seed)) for vector in every)
+        every = itertools.chain(self.chosen, self.fresh)
+        return ((vector, draw_transform(vector, self.seed)) for vector in every)
 
 
 def choose(level: str, groups: Sequence[str] = ()) -> list[Vector]:
@@ -142,8 +132,8 @@ def choose(level: str, groups: Sequence[str] = ()) -> list[Vector]:
 def read_known(path: Path) -> frozenset[str]:
     """Read a known-failures file: one name a line, # begins a comment.
 
-    A name is a case's id; ID@SEED for the run of one seed, which a drawn question needs; drawn/* or fresh/*
-    for all of these, which may pass; declined/GROUP or declined/all where too much is declined.
+    A name is a case's id; ID@SEED for the run of one seed, which a fresh question needs; fresh/* for all of
+    these, which may pass; declined/GROUP or declined/all where too much is declined.
 
     Raises:
         BadInput: naming the line whose name the suite does not have, or that comes twice.
@@ -153,10 +143,9 @@ def read_known(path: Path) -> frozenset[str]:
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"known failures {str(path)!r} cannot be read: {error}") from None
     corpus = vectors.load("stress")
-    names = {vector.id for vector in corpus} | set(OTHER_CASES) | {f"{DRAWN}/*", f"{FRESH}/*"}
+    names = {vector.id for vector in corpus} | set(OTHER_CASES) | {f"{FRESH}/*"}
     names |= {f"declined/{group}" for group in ("all", *OTHER_GROUPS, *(v.group for v in corpus))}
-    numbers = {DRAWN: N_DRAWN, FRESH: max(N_FRESH.values())}
-    drawn = {f"{group}/{number}" for group, n in numbers.items() for number in range(1, n + 1)}
+    drawn = {f"{FRESH}/{number}" for number in range(1, max(N_FRESH.values()) + 1)}
     found: set[str] = set()
     for number, line in enumerate(lines, 1):
         name = line.partition("#")[0].strip()
@@ -167,7 +156,7 @@ def read_known(path: Path) -> frozenset[str]:
         if name in found or not is_listed:
             problem = "comes twice" if name in found else "is no case of this suite"
             if name in drawn:
-                problem = f"is of one run's questions: {name}@SEED lists it, {name.partition('/')[0]}/* all"
+                problem = f"is of one run's questions: {name}@SEED lists it, {FRESH}/* all"
             raise BadInput(f"known failures {str(path)!r}:{number}: {name} {problem}")
         found.add(name)
     return frozenset(found)
@@ -191,7 +180,7 @@ def converse(
     for name, act in (("start", session.start), ("echo", session.probe)):
         results.append(_closed(session, _tried(name, act)))
         if results[-1].verdict in BAD:
-            unreached = Trouble(results[-1].verdict, f"not asked: {name} failed")
+            unreached = CheckFailure(results[-1].verdict, f"not asked: {name} failed")
             results += [_result(vector, unreached) for vector in questions.chosen]
             break
     else:
@@ -208,8 +197,10 @@ def converse(
         if not session.cannot_show:
             results.append(_closed(session, _tried("stop", session.stop)))
     results = [msgspec.structs.replace(r, is_known=_is_known(r, known, questions.seed)) for r in results]
-    passed = {result.id for result in results if result.verdict == "pass"}
-    graded = graded_parts([v for v in questions.chosen if v.id in passed], is_timed=speed is not None)
+    verdicts = {result.id: result.verdict for result in results}
+    passed = [vector for vector in questions.chosen if verdicts[vector.id] == "pass"]
+    failed = [vector for vector in questions.chosen if verdicts[vector.id] == "fail"]
+    graded = graded_parts(passed, is_timed=speed is not None)
     manifest = vectors.manifest()
     return Run(
         command=session.command,
@@ -225,7 +216,7 @@ def converse(
         stderr=session.stderr.text(),
         seconds=time.monotonic() - begin,
         graded={**graded, "not_graded": [*graded["not_graded"], *session.cannot_show]},
-        diagnosis=diagnose(results),
+        diagnosis=diagnose(failed, passed),
         known=known,
     )
 
@@ -241,21 +232,21 @@ def _tried(name: str, act: Callable[[], object]) -> Result:
     begin, verdict, why = time.monotonic(), "pass", ""
     try:
         act()
-    except Trouble as trouble:
-        verdict, why = trouble.verdict, trouble.why
+    except CheckFailure as failure:
+        verdict, why = failure.verdict, failure.why
     return Result(f"protocol/{name}", "protocol", verdict, why, time.monotonic() - begin)
 
 
-def ask_vector(session: Session, vector: Vector, disguise: Disguise = Disguise()) -> Result:  # noqa: B008
-    """Put one vector to an open session, in disguise, and grade the answer to the question as published."""
+def ask_vector(session: Session, vector: Vector, transform: Transform = Transform()) -> Result:  # noqa: B008
+    """Put an image of one vector to an open session, and grade the answer to the question as published."""
     assert session.introduction is not None
     begin, is_refused = time.monotonic(), vector.expect[0].outcome == "rejected"
     if lacking := missing(session.introduction, vector.kind, None if is_refused else vector.scene):
-        return _result(vector, Trouble("unsupported", lacking))
+        return _result(vector, CheckFailure("unsupported", lacking))
     try:
-        answer = published(session.ask(vectors.request(asked(vector, disguise), 0)), disguise)
-    except Trouble as trouble:
-        return _result(vector, trouble, time.monotonic() - begin)
+        answer = transform.restore(session.ask(vectors.request(transform.apply(vector), 0)))
+    except CheckFailure as failure:
+        return _result(vector, failure, time.monotonic() - begin)
     graded = grade(vector, answer)
     given, expected = _compared(vector, answer, graded)
     return Result(
@@ -265,7 +256,7 @@ def ask_vector(session: Session, vector: Vector, disguise: Disguise = Disguise()
         graded.why,
         time.monotonic() - begin,
         vector.level,
-        str(disguise),
+        str(transform),
         ulps=graded.ulps if math.isfinite(graded.ulps) else None,
         relative=graded.relative if math.isfinite(graded.relative) else None,
         answer=answer,
@@ -282,11 +273,11 @@ def _compared(
     if graded.verdict in ("pass", "wrong-format", "error"):
         return None, None
     certified = msgspec.to_builtins(middle(vector.expect[0], vector.state))
-    given = outcomes_of(answer)
+    outcomes = outcomes_of(answer)
     if vector.kind == "flow":
         certified = certified[-1:]
     at = graded.step
-    return given[at] if at < len(given) else None, certified[at] if at < len(certified) else None
+    return outcomes[at] if at < len(outcomes) else None, certified[at] if at < len(certified) else None
 
 
 def measure_speed(session: Session) -> Speed | None:
@@ -305,7 +296,7 @@ def measure_speed(session: Session) -> Speed | None:
         while min(ns) < TIMED_LEAST and n_collisions < 100_000 and seconds < TIMED_MOST:
             n_collisions *= 10 if min(ns) * 10 < TIMED_LEAST else 2
             ns, seconds, _ = timing.timed(session, scene, state, n_collisions, TIMED_REPEATS)
-    except (Trouble, *NOT_NUMBERS):
+    except (CheckFailure, *NOT_NUMBERS):
         return None
     if not min(ns):
         return None
@@ -317,8 +308,8 @@ def ask_nonsense(session: Session) -> None:
     state = {name: value for name, value in msgspec.to_builtins(TIMED_STATE).items() if name != "vy"}
     answer = session.ask({"cmd": "step", "scene": {"table": "cap", "r": 1.0}, "state": state, "t_end": 1.0})
     if answer.get("outcome") != "rejected":
-        raise Trouble("fail", f"a state without vy was answered {answer}"[:200])
+        raise CheckFailure("fail", f"a state without vy was answered {answer}"[:200])
 
 
-def _result(vector: Vector, trouble: Trouble, seconds: float = 0.0) -> Result:
-    return Result(vector.id, vector.group, trouble.verdict, trouble.why, seconds, vector.level)
+def _result(vector: Vector, failure: CheckFailure, seconds: float = 0.0) -> Result:
+    return Result(vector.id, vector.group, failure.verdict, failure.why, seconds, vector.level)

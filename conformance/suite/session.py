@@ -1,8 +1,8 @@
-"""A session of protocol 1 with one implementation: asks, decodes strictly, restarts after trouble.
+"""A session of protocol 1 with one implementation: asks, decodes strictly, restarts after a failure.
 
-What is no answer becomes a verdict (`Trouble`): crashed, timed-out, wrong-format; `error` when the
-restarts are used up and nothing was asked. After trouble the process is killed and the next question
-goes to a fresh one, to which `start` is replayed. When the time for the whole session is spent, all that is
+What is no answer becomes a verdict (`CheckFailure`): crashed, timed-out, wrong-format; `error` when the
+restarts are used up and nothing was asked. Then the process is killed and the next question goes to
+a fresh one, to which `start` is replayed. When the time for the whole session is spent, all that is
 still asked is `timed-out`. Sequence numbers are random, so that no answer can be given before its question.
 How an answer is read is in `conformance.suite.answers`; whether it is right is not judged here.
 """
@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from conformance.suite.answers import check_echo, read_answer, read_introduction, with_walls
-from conformance.suite.process import Process, Transcript, Trouble
+from conformance.suite.process import CheckFailure, Process, Transcript
 from scene.protocol.messages import PROTOCOL, Introduction
 from scene.refusal import BadInput
 
@@ -86,7 +86,7 @@ class Session(AbstractContextManager["Session"]):
         self._command, self.limits = command, limits or Limits()
         self.command = ["(in process)"] if callable(command) else list(command)
         self._process: Process | InProcess | None = None
-        self._end: Trouble | None = None
+        self._end: CheckFailure | None = None
         self._draw = random.Random()
         total = self.limits.total
         self._deadline = math.inf if total is None else time.monotonic() + total
@@ -104,7 +104,7 @@ class Session(AbstractContextManager["Session"]):
 
         Raises:
             CommandNotFound: when there is no such program.
-            Trouble: when it does not introduce itself in protocol 1; the session is then over.
+            CheckFailure: when it does not introduce itself in protocol 1; the session is then over.
         """
         if self._process is not None:
             raise RuntimeError("this session has started")
@@ -118,7 +118,7 @@ class Session(AbstractContextManager["Session"]):
         """Prove that numbers arrive and return with all their bits.
 
         Raises:
-            Trouble: wrong-format, naming the first number that does not; the session is then over.
+            CheckFailure: wrong-format, naming the first number that does not; the session is then over.
         """
         values = probe_values()
         self._opened({"cmd": "echo", "values": values}, partial(check_echo, values))
@@ -130,7 +130,7 @@ class Session(AbstractContextManager["Session"]):
             request: a step, trajectory, flow or time request; its seq is replaced by a random one.
 
         Raises:
-            Trouble: crashed, timed-out or wrong-format; error or timed-out when the session is over.
+            CheckFailure: crashed, timed-out or wrong-format; error or timed-out when the session is over.
         """
         seq = self._draw.randint(1, MAX_SEQ)
         line = msgspec.json.encode({**request, "seq": seq})
@@ -149,7 +149,7 @@ class Session(AbstractContextManager["Session"]):
             may_be_null: whether null will do for the seq.
 
         Raises:
-            Trouble: as `ask`.
+            CheckFailure: as `ask`.
         """
         if self._end is not None:
             raise self._end
@@ -158,7 +158,7 @@ class Session(AbstractContextManager["Session"]):
             self._restart()
         try:
             return read_answer(self._exchange(line), cmd, seq, may_be_null=may_be_null)
-        except Trouble:
+        except CheckFailure:
             self.kill()
             raise
 
@@ -166,12 +166,12 @@ class Session(AbstractContextManager["Session"]):
         """Ask the process to stop and see it end by itself.
 
         Raises:
-            Trouble: when it does not, goes on talking, or leaves a child; it is killed all the same.
+            CheckFailure: when it does not, goes on talking, or leaves a child; it is killed all the same.
         """
         process, self._process = self._process, None
         if process is None:
             self._check_time()
-            raise self._end or Trouble("error", "not asked: no process was left")
+            raise self._end or CheckFailure("error", "not asked: no process was left")
         try:
             process.finish(msgspec.json.encode({"cmd": "stop"}), min(STOP_TIMEOUT, self.limits.timeout))
         finally:
@@ -187,13 +187,13 @@ class Session(AbstractContextManager["Session"]):
         """Read the answer to a request without which the session is over."""
         try:
             return read(self._exchange(msgspec.json.encode(request)))
-        except Trouble as trouble:
-            raise self._given_up(trouble) from None
+        except CheckFailure as failure:
+            raise self._given_up(failure) from None
 
     def _check_time(self) -> None:
         if self._end is None and time.monotonic() >= self._deadline:
             why = f"not asked: the total time of {self.limits.total:g} s is spent"
-            raise self._given_up(Trouble("timed-out", why))
+            raise self._given_up(CheckFailure("timed-out", why))
 
     def _exchange(self, line: bytes) -> bytes:
         assert self._process is not None
@@ -204,19 +204,19 @@ class Session(AbstractContextManager["Session"]):
     def _restart(self) -> None:
         if self.n_restarts >= self.limits.restarts:
             why = f"not asked: restarted {self.n_restarts} times; --restarts allows more"
-            raise self._given_up(Trouble("error", why))
+            raise self._given_up(CheckFailure("error", why))
         self.n_restarts += 1
         try:
             self.start()
-        except (Trouble, BadInput) as trouble:
-            why = f"not asked: the restart failed, {trouble}"
-            raise self._given_up(Trouble("error", why)) from None
+        except (CheckFailure, BadInput) as failure:
+            why = f"not asked: the restart failed, {failure}"
+            raise self._given_up(CheckFailure("error", why)) from None
 
-    def _given_up(self, trouble: Trouble) -> Trouble:
+    def _given_up(self, failure: CheckFailure) -> CheckFailure:
         """End the session, and return what is the verdict of all that is still asked."""
         self.kill()
-        self._end = trouble
-        return trouble
+        self._end = failure
+        return failure
 
 
 def missing(introduction: Introduction, profile: str, scene: Mapping[str, Any] | None) -> str:

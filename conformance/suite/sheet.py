@@ -1,7 +1,7 @@
 """The suite without a dialogue: every question that hangs on no answer, and the grading of what came back.
 
-A sheet holds the questions of a run: the vectors up to a level in the images that its seed draws, the drawn
-and the fresh ones, and the checks whose questions are known beforehand (`CHECKS`). Each has a sequence number
+A sheet holds the questions of a run: the vectors up to a level in the images that its seed draws, the fresh
+ones, and the checks whose questions are known beforehand (`CHECKS`). Each has a sequence number
 that follows from the seed and the question, so that answers tell which questions they belong to. They are
 graded by the code that grades a dialogue: `_Replay` is a session that answers from what was read.
 
@@ -21,8 +21,7 @@ from conformance import plain, vectors
 from conformance.suite.answers import check_echo, read_answer, read_introduction, with_walls
 from conformance.suite.checks import checks_of, ensembles, run_check
 from conformance.suite.checks.form import QUESTIONS, SuiteCheck
-from conformance.suite.disguise import asked
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from conformance.suite.result import LAWS, TABLES, Run
 from conformance.suite.run import RunQuestions, ask_nonsense, converse
 from conformance.suite.session import MAX_SEQ, Session, needs, probe_values
@@ -104,7 +103,7 @@ class Sheet(RunQuestions):
         self.questions: dict[bytes, SheetQuestion] = {}
         self._numbers = set[int]()
         for vector, image in self.vectors():
-            self.add(vector.id, vectors.request(asked(vector, image), 0))
+            self.add(vector.id, vectors.request(image.apply(vector), 0))
         recorder = _Recorder(self)
         ask_nonsense(recorder)
         for check in self.checks:
@@ -209,22 +208,22 @@ class _Replay(Session):
 
     def start(self) -> Introduction:
         if self._answers.introduction is None:
-            raise Trouble("unsupported", "not in the answers: what it offers is what it answered")
+            raise CheckFailure("unsupported", "not in the answers: what it offers is what it answered")
         self.introduction = read_introduction(self._answers.introduction)
         return self.introduction
 
     def probe(self) -> None:
         if not self._answers.echoes:
-            raise Trouble("unsupported", "not in the answers")
+            raise CheckFailure("unsupported", "not in the answers")
         check_echo(probe_values(), self._answers.echoes[-1])
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
         question = self._sheet.questions.get(key_of(request))
         if question is None:
-            raise Trouble("unsupported", "not in files: the question hangs on an answer")
+            raise CheckFailure("unsupported", "not in files: the question hangs on an answer")
         line = self._answers.lines.get(question.seq)
         if line is None:
-            raise Trouble("declined", f"no answer with seq {question.seq}")
+            raise CheckFailure("declined", f"no answer with seq {question.seq}")
         self.sent = question.line
         line = _enveloped(line, request["cmd"], question.seq) if line.startswith(b"[") else line
         return with_walls(read_answer(line, request["cmd"], question.seq), request.get("scene"))

@@ -34,6 +34,7 @@ from support.faulty_readers import (
     refusing_starts,
     rounded,
     scene_by,
+    scene_kept,
     scenes_refused_for,
     slower,
     strictly_off,
@@ -44,6 +45,7 @@ from support.faulty_readers import (
     whole,
     wide_by_ranges,
     without,
+    without_depth,
     without_wall,
     wrong_after_bad_lines,
 )
@@ -149,6 +151,12 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     },
     "paths-by-first-parts": ("changed-questions", "fail", asked(scene_by, PATH, key=first_parts, book={})),
     "flows-by-first-parts": ("changed-questions", "fail", asked(scene_by, FLOW, key=first_parts, book={})),
+    "scenes-by-name": (
+        "changed-questions",
+        "fail",
+        asked(scene_kept, key=lambda scene: scene.get("name") or scene, book={}),
+    ),
+    "scenes-without-depth": ("changed-questions", "fail", asked(scene_kept, key=without_depth, book={})),
     "scenes-without-names": (
         "changed-questions",
         "fail",

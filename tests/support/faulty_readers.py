@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 from mpmath import fp
 
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from scene import Mushroom, from_data
 from scene.geometry import TableAt
 from scene.geometry import rounded as table_of
@@ -44,7 +44,7 @@ def at_bad_lines(act: Callable[[], Line]) -> Fault:
 
 def crash() -> Line:
     """Die."""
-    raise Trouble("crashed", "exited with status 1 before it answered")
+    raise CheckFailure("crashed", "exited with status 1 before it answered")
 
 
 def wrong_after_bad_lines(request: Line, answer: Answer, *, upset: list[Line]) -> Line:
@@ -140,6 +140,16 @@ def scene_by(
     laws = request["scene"].items()
     keys = sorted([name if are_named else "", repr(key(law))] for name, law in laws)
     request["scene"] = book.setdefault(repr(keys), request["scene"])
+
+
+def scene_kept(request: Line, *, key: Callable[[Line], Any], book: dict[str, Line]) -> None:
+    """Keep scenes by a key of the whole scene, and answer with the first scene of the same key."""
+    request["scene"] = book.setdefault(repr(key(request["scene"])), request["scene"])
+
+
+def without_depth(scene: Line) -> Line:
+    """Leave out how deep a stem is, and how its sides lean."""
+    return {name: law for name, law in scene.items() if name not in ("h", "slope")}
 
 
 def first_parts(law: Any) -> Any:

@@ -20,7 +20,7 @@ import msgspec
 
 import reference
 from conformance import verify
-from conformance.cases.certify import arrival, marks, stays
+from conformance.cases.certify import arrival, capture_intervals, marks
 from conformance.cases.prover import coasted, collided
 from conformance.cases.prover import ends as exact_ends
 from conformance.vectors import Certified, certified
@@ -175,7 +175,7 @@ def flow_path(name: str) -> tuple[list[Certified], tuple[tuple[int, int], ...]]:
     assert isinstance(path.outcome, reference.Horizon)
     steps = [certified(collided(step), [1.0] * 5, step.wall) for step in path.steps]
     horizon = coasted(path.outcome, exact_ends(path.steps[-1].after.t))
-    return [*steps, certified(horizon, [1.0] * 5, None)], stays(marks(scene, path.steps))
+    return [*steps, certified(horizon, [1.0] * 5, None)], capture_intervals(marks(scene, path.steps))
 
 
 def change_stays(how: str, random: Random, line: Line) -> Line | None:

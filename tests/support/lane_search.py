@@ -125,7 +125,7 @@ class Round(LaneRound):
     def ulps(self, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray) -> float | None:
         """Return the backward ulps of an answer beside the careful one; None for a delicate step.
 
-        `grading.error.backward_ulps`, with what a step changes by when a number of its start does.
+        `grading.agreement.backward_ulps`, with what a step changes by when a number of its start does.
         """
         off = np.abs(answer - truth)
         if bool(np.all(off <= BOUND * 2.0**-53 * np.abs(truth))):

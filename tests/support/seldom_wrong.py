@@ -117,23 +117,6 @@ def no_base_in_the_mouth(flight, plain):
     return Rejected("no base") if is_open and flight.wall == "base" else plain()
 
 
-KEPT: dict[str, object] = {}  # scenes that a faulty stepper takes up again
-
-
-@fault("kept by name", "", "__init__")
-def kept_by_name(flight, plain, scene, state, t_end):
-    """Takes two scenes of one name for the same."""
-    plain(KEPT.setdefault(scene.name or repr(scene), scene), state, t_end)
-
-
-@fault("kept without depth", "", "__init__")
-def kept_without_depth(flight, plain, scene, state, t_end):
-    """Forgets the depth of the stem and its slope in the key of a table."""
-    forgotten = {name: number for name, number in (("h", 1.0), ("slope", 0.0)) if name in laws(scene)}
-    key = repr(msgspec.structs.replace(scene, name="", **forgotten))
-    plain(KEPT.setdefault(key, scene), state, t_end)
-
-
 @fault("omega of the first", "anywhere-mushroom-floor", "law")
 def omega_of_the_first(flight, plain, law):
     """Takes omega of the first wave of a scene for all: one that stands still may have any."""
@@ -248,13 +231,13 @@ def faster_later(path, hit, is_followed):
     return msgspec.structs.replace(hit, vx=1.001 * hit.vx, vy=1.001 * hit.vy) if is_wrong else hit
 
 
-@fault("later hits in known scenes", "", "told", PlainPath)
+@fault("later hits in known scenes", "", "report", PlainPath)
 def faster_later_in_trajectories(path, plain, hit):
     """Is right in known scenes, and in steps."""
     return faster_later(path, plain(hit), path.most == MAX_COLLISIONS)
 
 
-@fault("flows in known scenes", "", "told", PlainPath)
+@fault("flows in known scenes", "", "report", PlainPath)
 def faster_later_in_flows(path, plain, hit):
     """Is right in known scenes, and in steps and trajectories."""
     return faster_later(path, plain(hit), path.most != MAX_COLLISIONS)

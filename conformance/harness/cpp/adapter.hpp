@@ -4,7 +4,7 @@
 //     int main() { return mushrooms::serve("my-engine", next_hit); }
 //
 // The engine returns time, place and velocity just after the next hit, however late; nothing for a particle that
-// meets no wall. It may throw mushrooms::Open where it cannot decide: of a tie (a corner, the mouth's edge, a hit
+// meets no wall. It may throw mushrooms::Undecided where it cannot decide: of a tie (a corner, the mouth's edge, a hit
 // at t_end) a next hit tells nothing, so that the kit takes what the engine returns for its answer. The kit reads
 // and checks the questions, keeps the horizon, names the wall (least |f| / |grad f| at the place of the hit),
 // chains trajectories and flows, times them, and refuses what is no state of the scene. A scene is refused where
@@ -29,7 +29,7 @@ constexpr double ON_WALL = 0x1p-20;   // of a wall's: farther from the wall that
 constexpr double LARGEST = 1e100;     // beyond it squares might overflow
 constexpr long MAX_COLLISIONS = 1000000, MAX_REPEAT = 1000;
 
-struct Open : std::runtime_error {  // answered `undecided`
+struct Undecided : std::runtime_error {  // answered `undecided`
     using std::runtime_error::runtime_error;
 };
 struct Refused : std::runtime_error {  // answered `rejected`
@@ -152,7 +152,7 @@ inline State read_state(const json::Value& data, const Scene& scene) {
         if (!wall.is_text() || q.wall == NO_WALL || is_absent) throw Refused("state.wall must be null or a wall");
     }
     for (double number : {q.x, q.y, q.vx, q.vy})
-        if (std::abs(number) > LARGEST) throw Open("numbers beyond 1e100 may overflow");
+        if (std::abs(number) > LARGEST) throw Undecided("numbers beyond 1e100 may overflow");
     if (q.wall == NO_WALL && q.y == 0 && !scene.is_mushroom()) q.wall = BASE;
     return q;
 }
@@ -160,30 +160,30 @@ inline State read_state(const json::Value& data, const Scene& scene) {
 // Judging ----------------------------------------------------------------------------------------------
 
 inline void judge(const Scene& scene, const State& q) {
-    if (q.wall == NO_WALL && q.y == 0 && q.vy == 0) throw Open("it flies along the mouth");
+    if (q.wall == NO_WALL && q.y == 0 && q.vy == 0) throw Undecided("it flies along the mouth");
     bool in_cap = scene.is_in_cap(q);
     double size = scene.size() + std::abs(q.t) * (scene.r.slope + scene.h.slope + scene.w.slope);
-    if (q.y == 0 && q.wall != NO_WALL && q.wall != BASE) throw Open("the state is in a corner");
+    if (q.y == 0 && q.wall != NO_WALL && q.wall != BASE) throw Undecided("the state is in a corner");
     if (scene.is_mushroom() && q.wall == NO_WALL && q.y == 0)
         for (Wall wall : {ARC, LEFT, RIGHT})  // at which the mouth and the base end
             if (std::abs(scene.distance(wall, q.t, q.x, q.y)) <= ROUNDING * size)
-                throw Open("the state is at the end of mouth or base within rounding");
+                throw Undecided("the state is at the end of mouth or base within rounding");
     for (Wall wall : scene.near(in_cap)) {
         double gap = scene.distance(wall, q.t, q.x, q.y);
         if (wall == q.wall || gap > ROUNDING * size) continue;
         if (gap < -ROUNDING * size) throw Refused(std::string("the state is beyond wall ") + WALLS[wall]);
-        throw Open(std::string("the state is within rounding of wall ") + WALLS[wall]);
+        throw Undecided(std::string("the state is within rounding of wall ") + WALLS[wall]);
     }
     if (q.wall == NO_WALL) return;
     bool is_beyond = scene.is_mushroom() && (q.wall == ARC ? q.y < 0 : q.wall > BASE && q.y > 0);
     double rate = scene.rate(q.wall, q), off = std::abs(scene.distance(q.wall, q.t, q.x, q.y)) - ON_WALL * scene.size(q);
     if (is_beyond || off > ROUNDING * size) throw Refused("the state is not on the wall that it names");
-    if (off > 0) throw Open("the state may be on the wall that it names within rounding of its phase");
+    if (off > 0) throw Undecided("the state may be on the wall that it names within rounding of its phase");
     double turns = scene.r.curvature + scene.h.curvature + scene.w.curvature + scene.slope.curvature * scene.h.high;
     if (scene.nu) turns += scene.nu->curvature * scene.r.high;
     if (q.wall == BASE) turns = 0;
     if (rate < -ROUNDING * std::abs(q.t) * turns) throw Refused("the state is on a wall and moves into it");
-    if (rate <= 0) throw Open("the state rests on its wall, or does within rounding of its phase");
+    if (rate <= 0) throw Undecided("the state rests on its wall, or does within rounding of its phase");
 }
 
 // Answering --------------------------------------------------------------------------------------------
@@ -204,7 +204,7 @@ inline std::string place(double t, double x, double y, double vx, double vy) {
 inline std::string outcome_of(const std::function<std::string()>& make) {
     try {
         return make();
-    } catch (const Open& question) {
+    } catch (const Undecided& question) {
         return std::string("\"outcome\":\"undecided\",\"reason\":\"") + question.what() + '"';
     } catch (const Refused& refusal) {
         return std::string("\"outcome\":\"rejected\",\"reason\":\"") + refusal.what() + '"';
@@ -265,7 +265,7 @@ inline std::string arrival(const Engine& engine, const Scene& scene, const json:
             if (!goes_on) return last;
             stay.add(scene, before, q);
         }
-        throw Open("there are over 1000000 collisions up to t_end");
+        throw Undecided("there are over 1000000 collisions up to t_end");
     });
     if (found.compare(0, HORIZON.size(), HORIZON) || std::isnan(stay.begin)) return found;
     return found + ",\"captured\":[" + shown(stay.begin) + "," + shown(std::isnan(stay.end) ? t_end : stay.end) + "]";
@@ -328,7 +328,7 @@ inline std::string answer(const std::string& name, const Engine& engine, const s
         if (command != "step" && command != "trajectory" && command != "flow" && command != "time") throw Refused("there is no such cmd");
         if (seq == "null") throw Refused("seq must be a whole number");
         return "{\"seq\":" + seq + "," + outcome(engine, request) + "}";
-    } catch (const Open& question) {
+    } catch (const Undecided& question) {
         return "{\"seq\":" + seq + ",\"outcome\":\"undecided\",\"reason\":\"" + question.what() + "\"}";
     } catch (const Failed& failure) {
         return "{\"seq\":" + seq + ",\"error\":\"" + failure.what() + "\"}";

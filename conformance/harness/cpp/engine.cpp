@@ -68,7 +68,7 @@ struct Flight {
             if (is_left) s = curve ? g.rate / curve : INFINITY;
             else s += SHORT * (g.rate < 0 ? 2 * g.f / (root - g.rate) : curve ? (g.rate + root) / curve : INFINITY);
         }
-        if (s <= b) throw Open("a wall is grazed within rounding, or nothing is met for long");
+        if (s <= b) throw Undecided("a wall is grazed within rounding, or nothing is met for long");
         return INFINITY;
     }
 
@@ -97,12 +97,12 @@ std::optional<Hit> next_hit(const Scene& scene, const State& q) {
             if (hit < s) second = s, s = hit, wall = near;
             else if (hit < second) second = hit;
         }
-        if (wall == NO_WALL && mouth > escape) throw Open("no wall is met in the time that it takes to leave the table");
-        if (second - s <= 0x1p-46 * s) throw Open("two walls are met within rounding");
+        if (wall == NO_WALL && mouth > escape) throw Undecided("no wall is met in the time that it takes to leave the table");
+        if (second - s <= 0x1p-46 * s) throw Undecided("two walls are met within rounding");
         double x = q.x + s * q.vx, y = q.y + s * q.vy, rate, t = q.t + s;
         if (wall == NO_WALL) {
             double beside = std::abs(x) - (scene.width(q.t) + scene.width_rise(q.t, s, rate));
-            if (std::abs(beside) <= 0x1p-46 * std::abs(x)) throw Open("the mouth's edge is met within rounding");
+            if (std::abs(beside) <= 0x1p-46 * std::abs(x)) throw Undecided("the mouth's edge is met within rounding");
             if (!in_cap || beside < 0) continue;
             wall = BASE, y = 0;
         }

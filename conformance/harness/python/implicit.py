@@ -20,7 +20,7 @@ On the wall that the particle leaves f(0) is 0.
 
 import math
 
-from conformance.harness.kit import Hit, Open, serve_engine
+from conformance.harness.kit import Hit, UndecidedError, serve_engine
 from conformance.plain import Flight
 from scene import Mushroom, Scene, State, Wall
 
@@ -47,7 +47,7 @@ class Path(Flight):
             if step <= 2.0**-52 * s:
                 break
             s += SHORT * step
-        raise Open("a wall is grazed, two are met at once, or nothing is met for long")
+        raise UndecidedError("a wall is grazed, two are met at once, or nothing is met for long")
 
     def safe(self, wall: Wall, gap: float, rate: float, bend: float) -> float:
         """Return a time for which a wall's f stays positive; 0 where it is not."""

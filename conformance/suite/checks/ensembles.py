@@ -16,7 +16,7 @@ from conformance.cases.draw import Draw
 from conformance.profiles import Statistic
 from conformance.suite.answers import read_outcome
 from conformance.suite.checks.form import Implementation, Question, SuiteCheck
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, load
 from scene.geometry import area
 from scene.protocol.wire import Captured, Flowing
@@ -48,7 +48,7 @@ class Size(NamedTuple):
     bias: float
 
 
-# By level: a slow stepper is done in a minute at core, where a mean growth of 0 could not be told from m1.
+# By level: a slow stepper is done in a minute at core, where a mean growth of 0 is within the margin of m1.
 SIZES = {
     "core": Size(400, 1000.0, 0.08),
     "extended": Size(4_000, 4000.0, 0.04),
@@ -78,7 +78,7 @@ def _hold(
     """Hold an ensemble to its statistics.
 
     Raises:
-        Trouble: declined, where it could not have failed.
+        CheckFailure: declined, where it could not have failed.
     """
     findings = test(partial(_flow, side), scene, size, seed)
     why = "; ".join(map(str, findings))
@@ -88,7 +88,7 @@ def _hold(
     )
     if idle := [finding for finding in findings if not finding.has_power]:
         alternatives = ", ".join(f"{finding.alternative:g}" for finding in idle)
-        raise Trouble(
+        raise CheckFailure(
             "declined", f"{why}: could not have failed at {alternatives}; a higher level follows more"
         )
     return why
@@ -110,7 +110,7 @@ def _mean_growth(flow: Flowing, scene: Mushroom, size: Size, seed: int) -> list[
     largest = math.log(max(areas) / min(areas))  # free particles keep E times the area at most
     m1 = float(_predicted().m1)
     if abs(m1) < size.bias + profiles.margin(size.n_particles, 0.0, 2 * (largest + size.bias), ALARM):
-        raise Trouble("declined", f"not asked: {size.n_particles} particles cannot tell m1 from 0")
+        raise CheckFailure("declined", f"not asked: {size.n_particles} particles cannot tell m1 from 0")
     return [
         profiles.mean_growth(flow, scene, m1=m1, largest=largest, **size._asdict(), seed=seed, alarm=ALARM)
     ]
@@ -119,7 +119,9 @@ def _mean_growth(flow: Flowing, scene: Mushroom, size: Size, seed: int) -> list[
 def _reversal(flow: Flowing, scene: Mushroom, size: Size, seed: int) -> list[Statistic]:
     n = size.n_particles
     if profiles.margin(n, 0.0, 1.0, ALARM) > DIRECTED:
-        raise Trouble("declined", f"not asked: {n} particles cannot tell a direction of time from the other")
+        raise CheckFailure(
+            "declined", f"not asked: {n} particles cannot tell a direction of time from the other"
+        )
     return [profiles.reversal(flow, scene, n_particles=n, energy=REVERSED, seed=seed, alarm=ALARM)]
 
 
@@ -137,6 +139,6 @@ def _flow(
         for part in side.flown(scene, states[start : start + BATCH], t_end):
             outcome = read_outcome(part)
             if isinstance(outcome, Horizon) and not math.isclose(outcome.t, t_end, rel_tol=properties.BOUND):
-                raise Trouble("fail", f"a flow to t_end = {t_end!r} is answered at t = {outcome.t!r}")
+                raise CheckFailure("fail", f"a flow to t_end = {t_end!r} is answered at t = {outcome.t!r}")
             found.append((outcome, part.get("captured")))
     return found

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from mpmath import fp
 
-from conformance.plain.flow import Stay
+from conformance.plain.flow import CaptureInterval
 from conformance.properties import BOUND, SLACK
 from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem
 from scene.geometry import half_width, table_at
@@ -24,7 +24,7 @@ from scene.laws import bounds, is_constant
 from scene.tables import laws
 
 FINE, COARSE = 2.0**-36, SLACK * BOUND  # of sizes
-FLIGHT = 2.0**-48  # of sizes: a straight flight, by who is fine
+FLIGHT = 2.0**-48  # of sizes: a straight flight, of a stepper that is fine
 LATE = 2.0**-50  # of t: what its last digits are
 N_PARTS = 7  # places on the way
 LEAST = 8  # numbers that tell how exact an implementation is
@@ -34,7 +34,7 @@ ON_EDGE = 2.0**-28  # relative: nearer to the edge of capture rounding may decid
 
 
 def is_fine(errors: Sequence[float], fine: float) -> bool:
-    """Tell whether errors are rounding, as a rule; of few it is not told."""
+    """Tell whether errors are rounding, as a rule; of few nothing is known."""
     return len(errors) >= LEAST and bool(np.quantile(errors, 0.7) <= fine / 4)
 
 
@@ -138,7 +138,7 @@ def _beyond(scene: Scene, before: Any, dt: Any, walls: Any, end: tuple[Any, Any]
     x, y = x0 + vx0 * s, y0 + vy0 * s
     x[:, -1], y[:, -1] = end
     table = table_at(fp, scene, t0 + s)
-    # At an end y is 0 but for rounding; which part of the table it belongs to is told by the flight before.
+    # At an end y is 0 but for rounding; which part of the table it belongs to follows from the flight before.
     is_above = np.where(np.abs(y) > FINE * table.size, y > 0, y0 + vy0 * s / 2 > 0)
     above = np.maximum((x * x + y * y - table.r * table.r) / np.where(is_above, table.r, 1.0), -y)
     below = np.maximum(np.maximum(np.abs(x) - table.half_width(y), -table.h - y), y)
@@ -174,7 +174,7 @@ def _not_kept(scene: Scene, start: State, after: Any) -> str:
     return ""
 
 
-def first_stay(
+def first_capture(
     scene: Mushroom, start: State, hits: Sequence[Outcome], t_end: float
 ) -> tuple[float, float] | None:
     """Return the first capture interval of a path, by docs/protocol.md; UNCLEAR where rounding decides.
@@ -185,7 +185,7 @@ def first_stay(
         hits: its collisions up to t_end.
         t_end: [time].
     """
-    stay = Stay()
+    stay = CaptureInterval()
     vx, vy = start.vx, start.vy
     for hit in hits:
         assert isinstance(hit, Collision)

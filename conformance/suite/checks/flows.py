@@ -20,11 +20,11 @@ from conformance.suite.checks.paths import (
     MAX_HITS,
     crossing,
     distance,
-    drawn,
-    is_same_stay,
+    draw_start,
+    is_same_capture,
     nearly_captured,
 )
-from conformance.suite.checks.refusals import INSIDE, RESTING, moved
+from conformance.suite.checks.refusals import INSIDE, RESTING, move_inwards
 from scene import (
     Cap,
     Collision,
@@ -72,9 +72,8 @@ def end_as_due(
     """Hold the outcomes, or the reasons of those that are undefined, to those that are due."""
     parts = side.parts(question(side.profile, scene, state, t_end, n))
     found = [part["reason"] if part["outcome"] == "undefined" else part["outcome"] for part in parts]
-    side.n_asked += 1
     if found[-1:] == ["undecided"] and len(found) <= len(due):
-        side.n_undecided += due[-1] in ("collision", "horizon")  # where mathematics has no answer it may be
+        side.n_undecided -= due[-1] not in ("collision", "horizon")  # it may be where no answer exists
         return False
     where = f"{n} hits from {state} to {t_end} in {scene}"
     assert found == list(due), f"{where} are answered {found}, must be {list(due)}"
@@ -121,7 +120,7 @@ def arrive(side: Implementation, scene: Scene, begin: float, end: float) -> bool
 def crowds(draw: Draw, profile: str) -> Iterator[Question]:
     """Ask flows of many states in any order: twins that differ in one field alone, bad ones, late ones."""
     for n in octaves(draw, 1, MAX_STATES):
-        scene, state = draw.pick((drawn(draw), *[nearly_captured(draw, draw.between(0.1, 0.3))[:2]] * 2))
+        scene, state = draw.pick((draw_start(draw), *[nearly_captured(draw, draw.between(0.1, 0.3))[:2]] * 2))
         size, span = float(table_at(fp, scene, state.t).size), crossing(scene, state)
         pool = [
             state,
@@ -135,7 +134,7 @@ def crowds(draw: Draw, profile: str) -> Iterator[Question]:
         hit = plain.next_collision(scene, state, FOREVER)
         assert isinstance(hit, Collision)
         # Off its wall by less than is allowed: with its name a state is on it, and without it is not.
-        x, y = moved(table_at(fp, scene, hit.t), hit.wall, hit.x, hit.y, 2.0**-22)
+        x, y = move_inwards(table_at(fp, scene, hit.t), hit.wall, hit.x, hit.y, 2.0**-22)
         on_wall = replace(hit.state(), x=float(x), y=float(y))
         pool += [hit.state(), on_wall, replace(on_wall, wall=None)]
         yield scene, pool, [draw.pick(range(len(pool))) for _ in range(math.ceil(n))], state.t + 1.5 * span
@@ -158,6 +157,6 @@ def together(
         one, other = read_outcome(part), read_outcome(own)
         assert distance(scene, one, other) <= ALONE, f"{where}: {one} among others, {other} alone"
         stays = part.get("captured"), own.get("captured")
-        same = is_same_stay(*stays, t_end - pool[i].t)
+        same = is_same_capture(*stays, t_end - pool[i].t)
         assert same, f"{where}: captured = {stays[0]} among others, {stays[1]} alone"
     return bool(n_compared)

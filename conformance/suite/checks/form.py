@@ -15,10 +15,10 @@ import msgspec
 
 from conformance.cases.draw import Draw
 from conformance.suite.answers import outcomes_of, read_outcome
-from conformance.suite.process import NOT_NUMBERS, Trouble
+from conformance.suite.process import NOT_NUMBERS, CheckFailure
 from conformance.suite.result import Result
 from conformance.suite.session import MAX_SEQ, Session, missing
-from scene import Collision, Outcome, Scene, State, Undecided, to_data
+from scene import Collision, Outcome, Scene, State, to_data
 from scene.protocol.messages import Introduction
 
 QUESTIONS = ("step", "trajectory", "flow")  # the profiles that answer by outcomes
@@ -36,7 +36,7 @@ class SuiteCheck(NamedTuple):
         name: group and name, as results show it.
         asks: (draw, profile) -> questions; each begins with a scene.
         judges: (implementation, *question) -> whether anything was compared, or what was found. It raises
-            AssertionError in one line where the answer is wrong, and `Trouble` where there is none.
+            AssertionError in one line where the answer is wrong, and `CheckFailure` where there is none.
         profiles: of which it is asked.
     """
 
@@ -64,30 +64,33 @@ class Implementation:
     def __call__(self, scene: Scene, state: State, t_end: float) -> Outcome:
         """Return one outcome: of a step, of a trajectory of one collision, or of a flow of one state."""
         if not all(math.isfinite(number) for number in (*msgspec.structs.astuple(state)[:5], t_end)):
-            raise Trouble("fail", f"its answers lead to the state {state} and t_end = {t_end}")
+            raise CheckFailure("fail", f"its answers lead to the state {state} and t_end = {t_end}")
         part, *more = self.parts(question(self.profile, scene, state, t_end))
         if more:
-            raise Trouble("wrong-format", f"{1 + len(more)} outcomes are answered to one question")
-        return self._counted(read_outcome(part, state.t))
+            raise CheckFailure("wrong-format", f"{1 + len(more)} outcomes are answered to one question")
+        return read_outcome(part, state.t)
 
     def by(self, *profiles: str, scene: Scene) -> "Implementation":
         """Return the same implementation, asked by the first of some profiles that it offers.
 
         Raises:
-            Trouble: unsupported, when it offers none.
+            CheckFailure: unsupported, when it offers none.
         """
         assert self.session.introduction is not None
         for profile in profiles:
             if not missing(self.session.introduction, profile, to_data(scene)):
                 return Implementation(self.session, profile)
-        raise Trouble("unsupported", f"profile {' or '.join(profiles)}")
+        raise CheckFailure("unsupported", f"profile {' or '.join(profiles)}")
 
     def parts(self, request: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Ask, and return the outcomes that are answered, as data; a whole refusal is the only one."""
+        """Ask, and return and count the outcomes that are answered; a whole refusal is the only one."""
         answer = self.session.ask(request)
         if "error" in answer:
-            raise Trouble("error", answer["error"])
-        return outcomes_of(answer)
+            raise CheckFailure("error", answer["error"])
+        found = outcomes_of(answer)
+        self.n_asked += len(found)
+        self.n_undecided += sum(part["outcome"] == "undecided" for part in found)
+        return found
 
     def said(self, line: str) -> dict[str, Any]:
         """Send a line as it is written, but for the seq in place of "SEQ", and return what it is answered."""
@@ -97,7 +100,7 @@ class Implementation:
         """Follow up to n collisions, and what comes instead of a further one: at once, or step by step.
 
         Raises:
-            Trouble: fail for steps that are too many, too few, or go on after the end.
+            CheckFailure: fail for steps that are too many, too few, or go on after the end.
         """
         found: list[Outcome] = []
         if self.profile == "step":
@@ -106,11 +109,11 @@ class Implementation:
             return found
         t = state.t
         for part in self.parts(question("trajectory", scene, state, t_end, n)):
-            found.append(self._counted(read_outcome(part, t)))
+            found.append(read_outcome(part, t))
             t = getattr(found[-1], "t", t)
         hits = [isinstance(outcome, Collision) for outcome in found]
         if len(found) > n or not all(hits[:-1]) or (len(found) < n and hits[-1:] != [False]):
-            raise Trouble(
+            raise CheckFailure(
                 "fail", f"{len(found)} steps, {sum(hits)} of them collisions, are answered to {n} collisions"
             )
         return found
@@ -119,19 +122,12 @@ class Implementation:
         """Carry states to t_end, and return what is answered for each.
 
         Raises:
-            Trouble: also wrong-format, for another number of states.
+            CheckFailure: also wrong-format, for another number of states.
         """
         found = self.parts(question("flow", scene, states, t_end)) if states else []
         if len(found) != len(states):
-            raise Trouble("wrong-format", f"a flow of {len(states)} states is answered {found}"[:200])
-        self.n_asked += len(found)
-        self.n_undecided += sum(part["outcome"] == "undecided" for part in found)
+            raise CheckFailure("wrong-format", f"a flow of {len(states)} states is answered {found}"[:200])
         return found
-
-    def _counted(self, outcome: Outcome) -> Outcome:
-        self.n_asked += 1
-        self.n_undecided += isinstance(outcome, Undecided)
-        return outcome
 
 
 def question(
@@ -165,7 +161,7 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
 
     for profile in check.profiles:
         side = Implementation(session, profile)
-        fitting, lacking = _drawn(check, session.introduction, profile, seed)
+        fitting, lacking = _draw_asked(check, session.introduction, profile, seed)
         for asked in fitting:
             try:
                 n += 1
@@ -175,15 +171,15 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
             except (AssertionError, *NOT_NUMBERS) as error:
                 what = "" if isinstance(error, AssertionError) else "its answers cannot be calculated with: "
                 return result("fail", f"{profile}: {what}{error}", as_pytest(check, profile, asked))
-            except Trouble as trouble:
-                if trouble.verdict == "unsupported":
-                    lacking = trouble.why
-                elif trouble.verdict == "declined":
+            except CheckFailure as failure:
+                if failure.verdict == "unsupported":
+                    lacking = failure.why
+                elif failure.verdict == "declined":
                     n_declined += 1
-                    notes.append(trouble.why)
+                    notes.append(failure.why)
                 else:
-                    why = f"{profile}: {trouble.why}"
-                    return result(trouble.verdict, why, as_pytest(check, profile, asked))
+                    why = f"{profile}: {failure.why}"
+                    return result(failure.verdict, why, as_pytest(check, profile, asked))
         n_open, n_asked = n_open + side.n_undecided, n_asked + side.n_asked
     why = "; ".join(notes[:4]) or f"{n_compared} of {n} compared"
     if n_declined > MAX_UNDECIDED * n:
@@ -193,7 +189,9 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
     return result("pass", why) if n_compared else result("unsupported", lacking or "nothing to compare")
 
 
-def _drawn(check: SuiteCheck, offered: Introduction, profile: str, seed: int) -> tuple[list[Question], str]:
+def _draw_asked(
+    check: SuiteCheck, offered: Introduction, profile: str, seed: int
+) -> tuple[list[Question], str]:
     """Return the questions that may be asked, drawn anew while too few are, and what the others need."""
     fitting: list[Question] = []
     lacking = "" if profile in offered.profiles else f"profile {profile}"

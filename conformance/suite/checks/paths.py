@@ -14,9 +14,9 @@ from msgspec.structs import replace
 
 from conformance import plain
 from conformance.cases import scenes
-from conformance.cases.draw import Draw
+from conformance.cases.draw import Draw, leaves, readable, wire_form
 from conformance.suite.answers import read_outcome
-from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_stay, flaw_of, is_fine
+from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_capture, flaw_of, is_fine
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from scene import (
     BadInput,
@@ -93,10 +93,10 @@ def _arrives(
     assert distance(scene, arrival, end) <= min(grown, CARRIED), (
         f"{state}: {arrival} by flow, {end} by its path, in {scene}"
     )
-    if isinstance(scene, Mushroom) and (stay := first_stay(scene, state, hits, t_end)) is not UNCLEAR:
-        told = found.get("captured")
-        assert is_same_stay(told, stay, t_end - state.t), (
-            f"{state}: captured = {told}, must be {stay}, in {scene}"
+    if isinstance(scene, Mushroom) and (stay := first_capture(scene, state, hits, t_end)) is not UNCLEAR:
+        answered = found.get("captured")
+        assert is_same_capture(answered, stay, t_end - state.t), (
+            f"{state}: captured = {answered}, must be {stay}, in {scene}"
         )
     return True
 
@@ -120,14 +120,14 @@ def distance(scene: Scene, a: Outcome, b: Outcome) -> float:
     return math.inf if math.isnan(found) else found
 
 
-def is_same_stay(a: Sequence[float] | None, b: Sequence[float] | None, span: float) -> bool:
+def is_same_capture(a: Sequence[float] | None, b: Sequence[float] | None, span: float) -> bool:
     """Tell whether two capture intervals of one particle are equal up to amplified rounding."""
     if a is None or b is None:
         return a is b
     return all(abs(one - other) <= CARRIED * span for one, other in zip(a, b, strict=True))
 
 
-def drawn(draw: Draw, kinds: Sequence[str] = USUAL, **at: Any) -> tuple[Scene, State]:
+def draw_start(draw: Draw, kinds: Sequence[str] = USUAL, **at: Any) -> tuple[Scene, State]:
     """Draw a scene with laws of some kinds, and a start in it that meets a wall soon."""
     while True:
         try:
@@ -147,7 +147,7 @@ def crossing(scene: Scene, state: State) -> float:
 def usual(draw: Draw, profile: str) -> Iterator[Question]:
     """Ask about scenes of all kinds."""
     for _ in range(N_USUAL):
-        scene, state = drawn(draw)
+        scene, state = draw_start(draw)
         yield scene, state, draw.pick((1, 2, 3, 4, 6))
 
 
@@ -247,17 +247,17 @@ def nearly_captured(draw: Draw, near: float) -> tuple[Scene, State, int]:
 def changed(draw: Draw, profile: str) -> Iterator[Question]:
     """Ask about a scene or a state, the same with one part changed, and the first again."""
     for change in [*octaves(draw, 2.0**-24, 1.0)] * 2:
-        scene, state = drawn(draw, MIXED)
+        scene, state = draw_start(draw, MIXED)
         other = next(
             filter(None, (_one_number_changed(draw, scene, state, change) for _ in range(64))), scene
         )
-        yield from ((one, state, 3) for one in (scene, other, scene))
+        yield from ((replace(one, name="scene"), state, 3) for one in (scene, other, scene))
     for _ in range(N_USUAL):
-        scene, state = drawn(draw)
+        scene, state = draw_start(draw)
         for other in _laws_renamed(scene, state):
-            yield from ((one, state, 2) for one in (scene, other, scene))
+            yield from ((replace(one, name="scene"), state, 2) for one in (scene, other, scene))
     for near in [*octaves(draw, 2.0**-44, 2.0**-4)] * 2:
-        scene, state = drawn(draw)
+        scene, state = draw_start(draw)
         name = draw.pick(("t", "x", "x", "y", "y", "vx", "vy"))
         nudged = replace(state, **{name: getattr(state, name) * (1.0 + near)})
         if _meets(scene, nudged):
@@ -279,22 +279,22 @@ def _meets(scene: Scene | None, state: State) -> bool:
 
 def _one_number_changed(draw: Draw, scene: Scene, state: State, change: float) -> Scene | None:
     """Return a scene in which one number is another, wherever it stands; None where nothing is met then."""
-    data = scenes.wire_form(scene)
-    numbers = [(label, number) for label, number in scenes.leaves(data) if number]
+    data = wire_form(scene)
+    numbers = [(label, number) for label, number in leaves(data) if number]
     labels = sorted({label for label, _ in numbers})
     label = draw.pick([name for name in labels if name in ("omega", "period")] or labels)
     label = draw.pick((label, draw.pick(labels)))  # a period as often as all that it shares a law with
     old = draw.pick([number for name, number in numbers if name == label])
-    other = scenes.readable(_replaced(data, old, old * (1.0 + change)))
+    other = readable(_replaced(data, old, old * (1.0 + change)))
     return other if other and _meets(other, state) else None
 
 
 def _laws_renamed(scene: Scene, state: State) -> Iterator[Scene]:
     """Return scenes with the same laws under other names."""
-    data = scenes.wire_form(scene)
+    data = wire_form(scene)
     for one, other in (("nu", "w"), ("r", "h"), ("w", "h")):
         names = {one: other, other: one}
-        renamed = scenes.readable({names.get(name, name): law for name, law in data.items()})
+        renamed = readable({names.get(name, name): law for name, law in data.items()})
         if renamed and renamed != scene and _meets(renamed, state):
             yield renamed
 
@@ -319,7 +319,7 @@ def late(draw: Draw, profile: str) -> Iterator[Question]:
     """Begin many periods from t = 0, before or after."""
     for wait in octaves(draw, 1, MAX_LATE):
         t = draw.pick((1.0, -1.0)) * wait * draw.between(1.0, 4.0)
-        yield *drawn(draw, ("fourier", "bang-bang"), t=t, speed=draw.power(0, 4)), 2
+        yield *draw_start(draw, ("fourier", "bang-bang"), t=t, speed=draw.power(0, 4)), 2
 
 
 def waiting(draw: Draw, profile: str) -> Iterator[Question]:

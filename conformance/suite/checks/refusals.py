@@ -18,7 +18,7 @@ from mpmath import fp
 from msgspec.structs import replace
 
 from conformance.cases import scenes
-from conformance.cases.draw import Draw
+from conformance.cases.draw import Draw, wire_form
 from conformance.suite.answers import outcomes_of
 from conformance.suite.checks.form import Implementation, Question, octaves, question
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem, Wall
@@ -60,7 +60,7 @@ def requests(draw: Draw, profile: str) -> Iterator[Question]:
     """Break requests in all ways that the schema forbids; the first is sound."""
     for scene in ASKED:
         state = INSIDE[type(scene)]
-        sound = question(profile, scenes.wire_form(scene), state, 0.5)
+        sound = question(profile, wire_form(scene), state, 0.5)
         yield scene, sound, ""
         for request, why in broken(sound):
             yield scene, request, why
@@ -194,14 +194,14 @@ def states(draw: Draw, scene: Scene, t: float) -> Iterator[tuple[State, str]]:
         x, y = _place(draw, table, wall)
         for part in octaves(draw, 2.0**-18, 2.0**-4):
             yield (
-                leaving(wall, moved(table, wall, x, y, -part), draw.pick((1.0, -1.0)), None),
+                leaving(wall, move_inwards(table, wall, x, y, -part), draw.pick((1.0, -1.0)), None),
                 f"is beyond {wall}",
             )
         for part in octaves(draw, OFF, 2.0**-6):
-            place = moved(table, wall, x, y, draw.pick((part, -part)))
+            place = move_inwards(table, wall, x, y, draw.pick((part, -part)))
             yield leaving(wall, place, 1.0, wall), "is not on its wall"
         for part in octaves(draw, ALLOWED / 16, ALLOWED):
-            yield leaving(wall, moved(table, wall, x, y, draw.pick((part, -part))), 1.0, wall), ""
+            yield leaving(wall, move_inwards(table, wall, x, y, draw.pick((part, -part))), 1.0, wall), ""
         for part in octaves(draw, 2.0**-12, 0.5):
             yield leaving(wall, (x, y), -part, wall), "moves into its wall"
             yield leaving(wall, (x, y), part, wall), ""
@@ -228,7 +228,7 @@ def _place(draw: Draw, table: TableAt, wall: Wall) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def moved(table: TableAt, wall: Wall, x: float, y: float, part: float) -> tuple[float, float]:
+def move_inwards(table: TableAt, wall: Wall, x: float, y: float, part: float) -> tuple[float, float]:
     """Move a point of a wall inwards by a part of the wall's size, as docs/protocol.md measures it."""
     if wall == "arc":
         return x * (1.0 - part), y * (1.0 - part)

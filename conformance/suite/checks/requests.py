@@ -15,10 +15,10 @@ from msgspec.structs import replace
 from conformance.cases.draw import Draw
 from conformance.suite.answers import outcomes_of, read_outcome, with_walls
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
-from conformance.suite.checks.paths import distance, drawn, is_same_stay
+from conformance.suite.checks.paths import distance, draw_start, is_same_capture
 from conformance.suite.checks.refusals import RESTING
-from conformance.suite.process import Trouble
-from scene import Mushroom, Scene, State, Stem, Undecided
+from conformance.suite.process import CheckFailure
+from scene import Mushroom, Scene, State, Stem
 
 MAX_LINE = 2**20  # bytes of a request
 ROUNDING, CARRIED = 2.0**-44, 2.0**-40  # of sizes: of a step, and of more
@@ -57,7 +57,7 @@ MALFORMED: tuple[tuple[bytes, int | None], ...] = (
 
 
 def _one(draw: Draw, profile: str) -> tuple[Scene, State, dict[str, Any]]:
-    scene, state = drawn(draw, t=float(draw.pick(range(4))))  # a whole number is written without a point, too
+    scene, state = draw_start(draw, t=float(draw.pick(range(4))))  # whole numbers may lack a point
     span = scene.period or 1.0
     t_end = state.t + span * draw.between(0.05, 0.5) if profile == "flow" else FOREVER
     return scene, state, question(profile, scene, state, t_end, N_HITS)
@@ -92,14 +92,14 @@ def passed_over(side: Implementation, scene: Scene, asked: Sequence[tuple[State,
     """Hold lines that are no requests to be refused, and what comes after them to be answered as before."""
     before = [side.session.ask(request) for _, request in asked]
     for line, seq in MALFORMED:
-        shown = line.decode()
+        text = line.decode()
         try:
             refusal = side.session.say(line, seq)
-            assert refusal.get("outcome") == "rejected", f"{shown}: answered {refusal}, must be rejected"
+            assert refusal.get("outcome") == "rejected", f"{text}: answered {refusal}, must be rejected"
             for (state, request), answer in zip(asked, before, strict=True):
-                _agree(side, scene, state, request, answer, f"before {shown}")
-        except Trouble as trouble:
-            raise Trouble(trouble.verdict, f"{shown}: {trouble.why}") from None
+                _agree(side, scene, state, request, answer, f"before {text}")
+        except CheckFailure as failure:
+            raise CheckFailure(failure.verdict, f"{text}: {failure.why}") from None
     return True
 
 
@@ -155,18 +155,16 @@ def _agree(
 ) -> bool:
     """Hold an answer to a question in another form to the answer to itself, to rounding."""
     own = side.parts(request)
-    told = with_walls({**answer}, request["scene"])
-    given = outcomes_of(told)
+    found = outcomes_of(with_walls({**answer}, request["scene"]))
     if "error" in answer:
-        raise Trouble("error", f"{answer['error']}: {how}")
-    assert len(given) == len(own), f"{given}, must be {own}: {how}"
+        raise CheckFailure("error", f"{answer['error']}: {how}")
+    assert len(found) == len(own), f"{found}, must be {own}: {how}"
     n_compared, t = 0, state.t
-    for one, other in zip(given, own, strict=True):
+    for one, other in zip(found, own, strict=True):
         stays = one.get("captured"), other.get("captured")
         a, b = read_outcome(one, t), read_outcome(other, t)
-        side.n_asked, side.n_undecided = side.n_asked + 1, side.n_undecided + isinstance(b, Undecided)
         assert type(a) is type(b), f"{one}, must be {other}: {how}"
-        gap = distance(scene, a, b) if is_same_stay(*stays, math.inf) else math.inf
+        gap = distance(scene, a, b) if is_same_capture(*stays, math.inf) else math.inf
         assert gap <= (ROUNDING if side.profile == "step" else CARRIED), f"{one}, must be {other}: {how}"
         n_compared += hasattr(b, "x")
     return bool(n_compared)

@@ -10,8 +10,8 @@ Not seen: a program that does part of its work outside its clock, once for each 
 """
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -19,7 +19,7 @@ from conformance.cases.draw import Draw
 from conformance.suite.answers import read_outcome
 from conformance.suite.checks.form import Implementation, Question, question
 from conformance.suite.checks.paths import distance
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from conformance.suite.session import Session
 from scene import Cap, Collision, Fourier, Outcome, Scene, State, Stem, Undecided
 
@@ -46,53 +46,44 @@ SCENES: tuple[Scene, ...] = (
 
 
 class Timing(NamedTuple):
-    """One answer to `time`: what it says, in nanoseconds, and the seconds that it took to come."""
+    """One answer to `time`: what it says, in nanoseconds, the seconds that it took to come, and its end."""
 
     ns: list[int]
     seconds: float
-    last: Collision
+    last: Outcome
 
 
-def timed(session: Session, scene: Scene, state: State, n: int, repeat: int) -> Timing:
-    """Ask for a timing.
+def ask_time(session: Session, scene: Scene, state: State, n: int, repeat: int) -> Timing:
+    """Ask for a timing, whatever its path ends in.
 
     Raises:
-        Trouble: also fail, when it does not end in one collision, or when its repeats cannot have taken place
-            in the time that the answer took; declined when it ends undecided.
+        CheckFailure: also fail, when it is no timing of so many repeats, or they cannot have taken place in
+            the time that the answer took.
     """
     request = {**question("time", scene, state, 0.0, n), "repeat": repeat}
     begin = time.monotonic()
     answer = session.ask(request)
     seconds = time.monotonic() - begin
-    ns, last = read_repeats(answer, repeat, seconds, 0.0)
-    return Timing(ns, seconds, _collision(last))
-
-
-def read_repeats(
-    answer: Mapping[str, Any], repeat: int, seconds: float, t: float
-) -> tuple[list[int], Outcome]:
-    """Read the nanoseconds and the last outcome, whatever it is, of an answer to `time`.
-
-    Args:
-        answer: as `Session.ask` returns it.
-        repeat: as asked for.
-        seconds: that the answer took to come.
-        t: when the last flight began, or any time where the flight time is not looked at.
-
-    Raises:
-        Trouble: error, when that is the answer; fail, when it is no timing of so many repeats, or they
-            cannot have taken place in that time.
-    """
     if "error" in answer:
-        raise Trouble("error", answer["error"])
+        raise CheckFailure("error", answer["error"])
     ns, steps = answer.get("ns"), answer.get("steps")
     if ns is None or steps is None or len(ns) != repeat or len(steps) != 1:
-        raise Trouble("fail", f"{repeat} repeats are answered {answer}"[:300])
-    last = read_outcome(steps[0], t)
+        raise CheckFailure("fail", f"{repeat} repeats are answered {answer}"[:300])
     if sum(ns) > DRIFT * 1e9 * seconds + TICK:
         waited = f"the answer came after {1e9 * seconds:.0f} ns"
-        raise Trouble("fail", f"{repeat} repeats are said to last {sum(ns)} ns in all, and {waited}")
-    return list(ns), last
+        raise CheckFailure("fail", f"{repeat} repeats are said to last {sum(ns)} ns in all, and {waited}")
+    return Timing(list(ns), seconds, read_outcome(steps[0], state.t))
+
+
+def timed(session: Session, scene: Scene, state: State, n: int, repeat: int) -> Timing:
+    """Ask for a timing of a path that goes on for ever.
+
+    Raises:
+        CheckFailure: as `ask_time` and `_collision`.
+    """
+    found = ask_time(session, scene, state, n, repeat)
+    _collision(found.last)
+    return found
 
 
 def questions(draw: Draw, profile: str) -> Iterator[Question]:
@@ -108,13 +99,13 @@ def same_steps(
     """Hold `time` to end where the trajectory does.
 
     Raises:
-        Trouble: fail; what following it runs into.
+        CheckFailure: fail; what following it runs into.
     """
     for n in counts:
         last = timed(side.session, scene, state, n, 2).last
         truth = _last_collision(side.session, scene, state, n)
         if distance(scene, last, truth) > NEAR:
-            raise Trouble("fail", f"the last of {n} collisions is {last} by time, {truth} by trajectory")
+            raise CheckFailure("fail", f"the last of {n} collisions is {last} by time, {truth} by trajectory")
     return True
 
 
@@ -125,9 +116,12 @@ def honest_clock(side: Implementation, scene: Scene, state: State) -> bool:
     while one.seconds < READABLE and n < MAX_COLLISIONS:
         n *= 2
         one = timed(session, scene, _other(state, n.bit_length()), n, 1)
-    last, truth = timed(session, scene, state, n, 1).last, _last_collision(session, scene, state, n)
+    last = _collision(timed(session, scene, state, n, 1).last)
+    truth = _last_collision(session, scene, state, n)
     if isinstance(scene, Cap) and abs(last.t - truth.t) > LATE * abs(truth.t - state.t):
-        raise Trouble("fail", f"{n} collisions last to {last.t:.6g} by time, to {truth.t:.6g} by trajectory")
+        raise CheckFailure(
+            "fail", f"{n} collisions last to {last.t:.6g} by time, to {truth.t:.6g} by trajectory"
+        )
     objection = ""
     for i in range(N_TRIES):
         time.sleep(i * PAUSE)
@@ -136,7 +130,7 @@ def honest_clock(side: Implementation, scene: Scene, state: State) -> bool:
             return True
         if ones[0].seconds < LONG:
             n = min(4 * n, MAX_COLLISIONS)
-    raise Trouble("fail", objection)
+    raise CheckFailure("fail", objection)
 
 
 def _objection(session: Session, scene: Scene, state: State, n: int, ones: list[Timing]) -> str:
@@ -177,10 +171,10 @@ def _collision(last: Outcome) -> Collision:
     """Return the end of a path that goes on for ever.
 
     Raises:
-        Trouble: declined where it is undecided, fail where it is no collision.
+        CheckFailure: declined where it is undecided, fail where it is no collision.
     """
     if isinstance(last, Undecided):
-        raise Trouble("declined", f"undecided: {last.reason}")
+        raise CheckFailure("declined", f"undecided: {last.reason}")
     if not isinstance(last, Collision):
-        raise Trouble("fail", f"a path that goes on for ever ends with {last}")
+        raise CheckFailure("fail", f"a path that goes on for ever ends with {last}")
     return last

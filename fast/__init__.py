@@ -11,10 +11,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fast.ensemble import Ensemble, simulate
+    from fast.ensemble import Ensemble, Paused, go_on, simulate
     from fast.fine import FineTrajectory, fine_trajectory
     from fast.flow import Flow, flow
-    from fast.paused import Paused, go_on
     from fast.step import next_collision
     from fast.trajectory import Collisions, trajectory
     from fast.until import Reached, follow

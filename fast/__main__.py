@@ -9,7 +9,7 @@ import msgspec
 
 import fast
 from fast.flow import carry_judged, refuse
-from fast.given import given_threads
+from fast.validation import given_threads
 from scene import Collision, Horizon, Outcome, Scene, State
 from scene.protocol.wire import serve
 

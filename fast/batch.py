@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast.compiled import compile_scene
 from fast.fine import FineTrajectory, as_pairs, as_trajectory, fill_path
 from fast.flow import follow_to
-from fast.kernel import codes, pools
+from fast.kernel import pools, records
 from fast.kernel.compiling import kept
 from fast.kernel.follow import advance
 from fast.kernel.lane_laws import know_laws, set_reference
@@ -28,7 +27,7 @@ from fast.kernel.worker import DISK, GENERAL, new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import only_stop
 from fast.step import WALL_NAMES, as_arrays, fitted_start, followed_paths, trouble
-from fast.units import fit
+from fast.units import compile_scene, fit
 from scene import Collision, Horizon, Outcome, Scene, State
 
 PLACE = (pools.X, pools.Y, pools.VX, pools.VY)
@@ -93,7 +92,7 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
     for state, start, code, row in zip(states, starts, paths.codes.tolist(), paths.steps[:, 0], strict=True):
         if code in WALL_NAMES:
             outcomes.append(Collision(WALL_NAMES[code], *start.units.steps(row).tolist()))
-        elif code == codes.HORIZON:  # it moves for ever
+        elif code == records.HORIZON:  # it moves for ever
             outcomes.append(Horizon(np.inf, state.x, state.y, state.vx, state.vy))
         else:
             outcomes.append(trouble(code, scene, state))
@@ -143,7 +142,7 @@ class LaneRound:
 
     def __init__(self, scene: Scene) -> None:
         self.compiled = compile_scene(scene)
-        self.is_disk = bool(self.compiled.table == codes.CAP)
+        self.is_disk = bool(self.compiled.table == records.CAP)
         self.in_lanes = laws_in_lanes(scene)
         self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6)), 1, (1, 1)))
         self.serves = float(np.diff(self.in_lanes.pieces.begins, append=self.in_lanes.pieces.period).max())
@@ -157,9 +156,9 @@ class LaneRound:
     def is_met(self, p: FloatArray, wall: int) -> bool:
         """Tell whether a state lies, but for rounding, on the wall that it leaves, as after a step."""
         particle = as_particle(p, wall)
-        if wall == codes.NO_WALL:
+        if wall == records.NO_WALL:
             return False
-        if wall == codes.BASE:
+        if wall == records.BASE:
             return bool(particle.y == 0.0)
         f, error = residual(particle, self.compiled, self.anchors)
         return bool(abs(f) <= error)

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.given import MAX_STEPS
-from fast.kernel import codes, entries
+from fast.kernel import entries, records
+from fast.kernel.entries import ANSWER_LOST
 from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray
-from fast.kernel.single import ANSWER_LOST
 from fast.step import WALL_CODES, WALL_NAMES, Start, check_state, trouble
 from fast.threads import follow_path
 from fast.units import LateTime, Units
+from fast.validation import MAX_STEPS
 from scene import Horizon, Outcome, Scene, State, Undecided, Wall, check_scene
 from scene.refusal import check_count
 
@@ -96,6 +96,6 @@ def as_trajectory(
     found = units.steps(steps[:n])
     if n < len(steps):
         last = found[n - 1, 2:, 0] if n else (state.x, state.y, state.vx, state.vy)
-        is_free = code == codes.HORIZON
+        is_free = code == records.HORIZON
         outcome = Horizon(np.inf, *map(float, last)) if is_free else trouble(code, scene, state, n)
     return FineTrajectory([WALL_NAMES[int(c)] for c in met[:n]], found, outcome)

@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from fast.ensemble import follow
-from fast.given import MOST_TO_A_TIME, given_states, given_threads
-from fast.kernel import codes
+from fast.kernel import records
+from fast.kernel.entries import ANSWER_LOST
 from fast.kernel.records import FloatArray, Followed, IntArray, unfilled_ends
-from fast.kernel.single import ANSWER_LOST
 from fast.pieces import laws_in_lanes
 from fast.starts import least_collisions, only_stop
 from fast.step import as_arrays, fitted_start, next_collision, trouble
 from fast.units import fit
+from fast.validation import MOST_TO_A_TIME, given_states, given_threads
 from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State, Undecided, check_scene
 from scene.refusal import check_number
 
@@ -74,7 +74,7 @@ def carry_judged(
     starts = list(itertools.compress(states, is_free))
     done, _ = follow_to(scene, starts, t_end, threads)
     arrivals = iter(
-        Horizon(t_end, *place) if code == codes.HORIZON else trouble(code, scene, state, n)
+        Horizon(t_end, *place) if code == records.HORIZON else trouble(code, scene, state, n)
         for state, code, place, n in zip(
             starts, done.codes.tolist(), done.states[:, 2:].tolist(), done.counts.sum(axis=1), strict=True
         )

@@ -23,11 +23,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.compiled import HALF_PI, compile_scene
 from fast.kernel import entries
 from fast.kernel.arithmetic import MAX_QUADRANT
-from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
-from fast.kernel.pieces import PARABOLA, SERIES
+from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, PARABOLA, SERIES, TWO_WAVES
+from fast.units import HALF_PI, compile_scene
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, BANG_BANG, CONSTANT, DEPTH, FOURIER, KIND, KNOTS, LEVEL, LOWEST, N_HARMONICS,

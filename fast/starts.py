@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from mpmath import fp
 
-from fast.given import MOST_IN_CYCLES, MOST_TO_A_TIME
 from fast.kernel import entries
 from fast.kernel.records import FloatArray, Stops
+from fast.validation import MOST_IN_CYCLES, MOST_TO_A_TIME
 from scene import Scene
 from scene.geometry import table_at
 from scene.laws import bounds

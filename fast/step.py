@@ -8,11 +8,11 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from fast.given import MOST_TO_A_TIME, given_state
-from fast.kernel import careful, codes, entries, single
-from fast.kernel.loops import careful_at
+from fast.kernel import entries, records, scalar_step
 from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, Paths, unfilled_paths
+from fast.kernel.worker import careful_at
 from fast.units import ANSWER_LOST, LateTime, Units, fit
+from fast.validation import MOST_TO_A_TIME, given_state
 from scene import (
     Collision,
     Horizon,
@@ -31,26 +31,26 @@ from scene.refusal import BadInput, check_number
 from scene.states import check_numbers
 
 WALL_NAMES: dict[int, Wall] = {
-    int(codes.ARC): "arc",
-    int(codes.BASE): "base",
-    int(codes.LEFT): "left",
-    int(codes.RIGHT): "right",
-    int(codes.FLOOR): "floor",
+    int(records.ARC): "arc",
+    int(records.BASE): "base",
+    int(records.LEFT): "left",
+    int(records.RIGHT): "right",
+    int(records.FLOOR): "floor",
 }
-WALL_CODES: dict[Wall | None, int] = {None: int(codes.NO_WALL)} | {n: c for c, n in WALL_NAMES.items()}
+WALL_CODES: dict[Wall | None, int] = {None: int(records.NO_WALL)} | {n: c for c, n in WALL_NAMES.items()}
 REASONS: dict[int, Outcome] = {
-    int(codes.SLIDING): Undefined("sliding"),
-    int(codes.MOUTH_EDGE): Undefined("mouth-edge"),
-    int(codes.ON_CORNER): Undefined("corner"),
-    int(codes.TOO_MANY): Undecided(f"no hit within {careful.MAX_PARABOLAS} sub-intervals"),
-    int(codes.TANGENT): Undecided("f and f' vanish together within rounding"),
-    int(codes.CORNER): Undecided("two walls are hit together within rounding"),
-    int(codes.EDGE): Undecided("the mouth's edge is hit within rounding"),
-    int(codes.AT_END): Undecided("a wall is hit at the horizon within rounding"),
-    int(codes.START): Undecided("the state is on another wall within rounding"),
-    int(codes.TOO_FAR): Undecided(f"t_end is over {MOST_TO_A_TIME:.0e} collisions away"),
-    int(single.ANSWER_LOST): Undecided(ANSWER_LOST),
-    int(codes.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
+    int(records.SLIDING): Undefined("sliding"),
+    int(records.MOUTH_EDGE): Undefined("mouth-edge"),
+    int(records.ON_CORNER): Undefined("corner"),
+    int(records.TOO_MANY): Undecided(f"no hit within {scalar_step.MAX_PARABOLAS} sub-intervals"),
+    int(records.TANGENT): Undecided("f and f' vanish together within rounding"),
+    int(records.CORNER): Undecided("two walls are hit together within rounding"),
+    int(records.EDGE): Undecided("the mouth's edge is hit within rounding"),
+    int(records.AT_END): Undecided("a wall is hit at the horizon within rounding"),
+    int(records.START): Undecided("the state is on another wall within rounding"),
+    int(records.TOO_FAR): Undecided(f"t_end is over {MOST_TO_A_TIME:.0e} collisions away"),
+    int(entries.ANSWER_LOST): Undecided(ANSWER_LOST),
+    int(records.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
 }
 
 
@@ -93,9 +93,9 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         )
         if code in WALL_NAMES:
             return Collision(WALL_NAMES[code], dt, t, x, y, vx, vy)
-        if code == codes.HORIZON:
+        if code == records.HORIZON:
             return Horizon(t_end, x, y, vx, vy)
-        if code == single.REFUSED:  # by the checks that follow, made in compiled code: they say why
+        if code == entries.REFUSED:  # by the checks that follow, made in compiled code: they say why
             check_numbers(scene, state, t_end)
             fitted_start(scene, state).units.horizon(t_end)
     except LateTime as error:
@@ -220,13 +220,13 @@ def trouble(code: int, scene: Scene, state: State, n: int = 0) -> Outcome:
 
     A state is refused before the first of them only: later, what looks like one beyond a wall is rounding.
     """
-    if code == codes.START and not n:
+    if code == records.START and not n:
         wall = rounded(scene, state.t).nearest_wall(state.x, state.y, but=state.wall)
         return Undecided(placed(scene, state, wall, "within rounding of"))
     since = f"{n} collisions after state.t = {state.t!r}" if n else f"state.t = {state.t!r}"
-    if code == codes.FAR_TIME:
+    if code == records.FAR_TIME:
         return Undecided(f"{since}: {TOO_LATE}")
     found = REASONS.get(code)
     if n and (found is None or isinstance(found, Rejected)):
         return Undecided(f"{since}: rounding puts the particle beyond a wall")
-    return found or Rejected(placed(scene, state, WALL_NAMES[int(code - codes.BEYOND)], "beyond"))
+    return found or Rejected(placed(scene, state, WALL_NAMES[int(code - records.BEYOND)], "beyond"))

@@ -6,16 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.given import MAX_STEPS, given_end
-from fast.kernel import codes, entries, single
-from fast.kernel.loops import Loops, careful_at
+from fast.kernel import entries, records
 from fast.kernel.records import FloatArray, unfilled_ends, unfilled_paths
-from fast.kernel.worker import new_worker
+from fast.kernel.worker import Loops, careful_at, new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import only_stop
 from fast.step import WALL_NAMES, as_arrays, check_state, trouble
 from fast.threads import follow_path
 from fast.units import LateTime, fit
+from fast.validation import MAX_STEPS, given_end
 from scene import Horizon, Outcome, Scene, State, Undecided, Wall, check_scene
 from scene.refusal import check_count
 
@@ -73,7 +72,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     n, code = paths.counts.item(), paths.codes.item()
     n_exact = paths.n_exact.item() if factors is not None else start.units.n_exact(paths.steps[0, :n])
     if n_exact < n:
-        n, code = n_exact, single.ANSWER_LOST
+        n, code = n_exact, entries.ANSWER_LOST
     steps = paths.steps[0, :n] if n == n_collisions else paths.steps[0, :n].copy()  # not all room is held
     steps = steps if factors is not None else start.units.steps(steps)
     walls = NAMES.take(paths.walls[0, :n]).tolist()
@@ -81,12 +80,12 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     if n < n_collisions:
         # Without a horizon only what rests is never met, and it rests where it was: there is no v * infinity.
         last = steps[n - 1, 2:] if n else np.array([state.x, state.y, state.vx, state.vy])
-        if code == codes.HORIZON and np.isfinite(t_end):
+        if code == records.HORIZON and np.isfinite(t_end):
             place = paths.ends[:, 2:]
             if start.units.keeps(place).all():
                 last = start.units.places(place[0])
             else:
-                code = single.ANSWER_LOST
-        is_horizon = code == codes.HORIZON
+                code = entries.ANSWER_LOST
+        is_horizon = code == records.HORIZON
         outcome = Horizon(t_end, *(float(v) for v in last)) if is_horizon else trouble(code, scene, state, n)
     return Collisions(walls, steps, outcome)

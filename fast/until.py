@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from fast.given import MAX_STEPS, given_end, given_energy, given_states
 from fast.trajectory import Collisions, trajectory
+from fast.validation import MAX_STEPS, given_end, given_energy, given_states
 from scene import Mushroom, Outcome, Scene, State, check_scene
 from scene.geometry import half_width
 from scene.laws import values

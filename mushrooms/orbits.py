@@ -22,8 +22,8 @@ from mpmath import fp
 
 import scene as scenes
 from conformance.files import write_file
-from fast.given import given_energy
 from fast.until import captured, sin_phi
+from fast.validation import given_energy
 from mushrooms.output import import_arrow
 from scene import Outcome, Scene, State, Stem, Wall
 from scene.geometry import TableAt, table_at

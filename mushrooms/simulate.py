@@ -171,7 +171,7 @@ def _check_ensemble(energy: float, cycles: int, seed: int, threads: int | None) 
 
 
 def _given_phases(text: str | None) -> tuple[float, ...]:
-    from fast.given import given_phases
+    from fast.validation import given_phases
 
     if text is None:
         return ()

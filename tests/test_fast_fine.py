@@ -18,11 +18,11 @@ import reference
 from conformance.grading.agreement import compare
 from conformance.grading.agreement import exact as enclosed
 from conformance.strategies import scenes_and_states
-from fast.compiled import compile_scene
 from fast.fine import fill_path
-from fast.kernel import codes
-from fast.kernel import double_double as dd
+from fast.kernel import arithmetic as dd
+from fast.kernel import records
 from fast.step import WALL_CODES
+from fast.units import compile_scene
 from scene import Collision, Mushroom, State, Stem, Undecided, load
 from scene.geometry import table_at
 from scene.tables import period
@@ -30,7 +30,7 @@ from scene.tables import period
 N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "250"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
 SHARP = 4.0  # units that nearly all answers keep
-WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.kernel.refine
+WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.kernel.fine_step
 # So soon, in periods, or leaving its wall so slowly, in parts of the speed, that terms cancel.
 BRIEF, GRAZING = 2.0**-33, 2.0**-36
 START = State(0.1, 0.2, 0.3, 140.0, 30.0)
@@ -157,4 +157,4 @@ def test_rounding_a_state_of_pairs_is_not_taken_for_a_gap():
     start = np.array([[0.0, 0.0], [1.0 - d, 0.0], [d - 1.0, -5e-17], [1.0, 0.0], [2e-7 - 1.0, 0.0]])
     steps, met = np.empty((1, 6, 2)), np.empty(1, dtype=np.int64)
     n, code = fill_path(compile_scene(scene), start, WALL_CODES[None], steps, met)
-    assert (n, code) == (0, codes.CORNER)
+    assert (n, code) == (0, records.CORNER)

@@ -7,8 +7,8 @@ import pytest
 from msgspec.structs import replace
 
 import fast
-from fast import paused, pieces
-from fast.kernel import kept
+from fast import ensemble, pieces
+from fast.kernel import follow
 from fast.kernel.arithmetic import MAX_QUADRANT
 from fast.pieces import laws_in_lanes
 from fast.starts import one_cycle
@@ -104,11 +104,11 @@ def test_who_cannot_go_on_is_followed_from_the_start(monkeypatch):
     lost.lanes[::3] = np.nan
     assert is_same(fast.go_on(scene, n_cycles=3, before=lost, **asked), three)
     tied = one._replace(lanes=one.lanes.copy())
-    is_right = tied.lanes[:, kept.IS_KNOWN] > 0
+    is_right = tied.lanes[:, follow.IS_KNOWN] > 0
     assert is_right.any()
-    tied.lanes[is_right, kept.FIRST_ROW] -= 0.25 * one_cycle(fit(scene).scene)
+    tied.lanes[is_right, follow.FIRST_ROW] -= 0.25 * one_cycle(fit(scene).scene)
     assert is_same(fast.go_on(scene, n_cycles=3, before=tied, **asked), three)
-    monkeypatch.setattr(paused.codes, "ANEW", 99)  # nobody is followed anew
+    monkeypatch.setattr(ensemble.records, "ANEW", 99)  # nobody is followed anew
     found = fast.go_on(scene, n_cycles=3, before=tied, **asked)
     assert found.ensemble.sha256() != three.ensemble.sha256()
 
@@ -119,8 +119,8 @@ def from_the_last_state(found, units):
     rows = [run.t, np.zeros(len(run.t)), run.x, run.y, run.vx, run.vy]
     sizes = [*units.times(np.ones(2)), *units.places(np.ones((1, 4)))[0]]  # powers of 2
     for k, (row, size) in enumerate(zip(rows, sizes, strict=True)):
-        lanes[:, kept.FIRST_ROW + k] = row / size
-    lanes[:, kept.FIRST_ROW + 6], lanes[:, kept.IS_KNOWN] = -1.0, 0.0  # on no wall, and no law is known
+        lanes[:, follow.FIRST_ROW + k] = row / size
+    lanes[:, follow.FIRST_ROW + 6], lanes[:, follow.IS_KNOWN] = -1.0, 0.0  # on no wall, and no law is known
     return found._replace(lanes=lanes)
 
 
@@ -137,8 +137,8 @@ def test_a_last_state_is_not_enough():
 
 def test_no_number_of_a_lane_may_be_forgotten(halves):
     """Each is needed somewhere."""
-    needed = {column for column in range(kept.LANE_ROWS) if any(misses(half, column) for half in halves)}
-    assert needed == set(range(kept.LANE_ROWS))
+    needed = {column for column in range(follow.LANE_ROWS) if any(misses(half, column) for half in halves)}
+    assert needed == set(range(follow.LANE_ROWS))
 
 
 def misses(half, column):
@@ -156,7 +156,7 @@ def misses(half, column):
 @pytest.fixture
 def halves(monkeypatch):
     """Return runs that are half done, and what they shall come to; nobody of them is followed anew."""
-    monkeypatch.setattr(paused.codes, "ANEW", 99)
+    monkeypatch.setattr(ensemble.records, "ANEW", 99)
     found = []
     for scene in SCENES.values():
         for energy in (3.0, 300.0):

@@ -12,8 +12,8 @@ import pytest
 
 import fast
 from fast import step as stepper
-from fast.kernel import codes
-from fast.kernel.single import REFUSED
+from fast.kernel import records
+from fast.kernel.entries import REFUSED
 from fast.units import LateTime
 from scene import (
     BadInput,
@@ -61,7 +61,7 @@ def by_separate_checks(scene: Scene, state: State, t_end: float) -> Outcome:
     try:
         if code in stepper.WALL_NAMES:
             return Collision(stepper.WALL_NAMES[code], *start.units.steps(paths.steps[0, 0]).tolist())
-        if code == codes.HORIZON:
+        if code == records.HORIZON:
             return Horizon(t_end, *start.units.places(paths.ends[0, 2:]).tolist())
     except BadInput as error:  # the answer does not fit into binary64
         return Undecided(str(error))
@@ -109,7 +109,7 @@ def test_a_kernel_that_overlooks_the_wall_is_found(monkeypatch):
 
     def lenient(*question):
         found = single(*question)
-        return single(*question[:-2], int(codes.NO_WALL), question[-1]) if found[0] == REFUSED else found
+        return single(*question[:-2], int(records.NO_WALL), question[-1]) if found[0] == REFUSED else found
 
     monkeypatch.setattr(stepper.entries, "single_at_once", lambda: lenient)
     monkeypatch.setattr(stepper, "latest", [None])

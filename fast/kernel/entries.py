@@ -1,7 +1,10 @@
 """The compiled functions that Python calls, kept in numba's disk cache.
 
 Files of other sources have other names, so that a change in any source compiles them anew: see
-fast.kernel.compiling.
+fast.kernel.compiling. `single` is one scalar step of one particle, from numbers to numbers: most of what one
+question costs is around it. So units are changed here and not in Python, the scene is one array and the
+answer a tuple. Nothing is kept between calls, so that threads may ask side by side. What is refused here is
+refused by the checks in Python too, which say why.
 """
 
 from __future__ import annotations
@@ -13,17 +16,129 @@ import numpy as np
 from numba import config, types
 
 from fast.kernel.arithmetic import sine_cosine
-from fast.kernel.codes import HORIZON, OFF_WALL
-from fast.kernel.compiling import HOW, kept
+from fast.kernel.compiling import HOW, kept, kernel, part
+from fast.kernel.fine_step import fine_path
 from fast.kernel.follow import follow
-from fast.kernel.judged import GIVEN, KNOWN, MET
-from fast.kernel.lane_laws import ONE_WAVE, TWO_WAVES
-from fast.kernel.loops import FORMS, run_careful
-from fast.kernel.path import follow_one
-from fast.kernel.pieces import fill_coefficients
-from fast.kernel.records import ANCHORS_SHAPE, particle_at, write_state, write_step
-from fast.kernel.refine import fine_path
-from fast.kernel.single import single_step
+from fast.kernel.lane_laws import ONE_WAVE, TWO_WAVES, fill_coefficients
+from fast.kernel.one_path import follow_one
+
+from fast.kernel.records import (  # isort: skip
+    ANCHORS_SHAPE, HORIZON, OFF_WALL, SHARED, Compiled, Particle, particle_at, write_state, write_step,
+)  # fmt: skip
+from fast.kernel.scalar_step import GIVEN, KNOWN, MET
+from fast.kernel.worker import FORMS, run_careful
+
+# Beside those of fast.kernel.records: the question is no good, and the answer does not fit into binary64.
+REFUSED, ANSWER_LOST = np.array([53, 54])
+# Squares of what is larger overflow.
+LARGEST = 2.0**400
+LENGTH, TIME = 96, 32  # exponents of a table's size and period in the kernel
+LARGEST_FLOAT = float(np.finfo(np.float64).max)
+
+
+def _plain_ldexp(number, exponent):
+    try:
+        return math.ldexp(number, exponent)
+    except OverflowError:
+        return math.copysign(math.inf, number)
+
+
+# Python's own ldexp raises where C has infinity.
+ldexp = _plain_ldexp if config.DISABLE_JIT else math.ldexp
+
+
+def pack_scene(scene, length, time):
+    """Return a Compiled and its units as one array of floats; see fast.units.
+
+    Every argument more costs a call some twentieth of a microsecond.
+    """
+    time = math.nan if time is None else time
+    first = [scene.table, scene.is_relative, length, time]
+    return np.concatenate([first, scene.bounds.ravel(), scene.laws.ravel()])
+
+
+@part
+def unpack_scene(numbers):
+    """Return the Compiled that `packed` was given."""
+    bounds, laws = numbers[4:20].reshape((4, 4)), numbers[20:]
+    return Compiled(
+        int(numbers[0]), numbers[1] != 0.0, laws.reshape((SHARED + 1, len(laws) // (SHARED + 1))), bounds
+    )
+
+
+def static_time(length, speed):
+    """Return the exponent of a static table's unit of time, for a state of this speed; see fast.units."""
+    return length + LENGTH - TIME - (math.frexp(speed)[1] - 1) if speed > 0.0 else 0
+
+
+static_time_inside = kernel(static_time)
+
+
+@kernel
+def scaled(number, exponent):
+    """Return a number times 2^exponent, and whether that is finite and exact."""
+    if -1000 <= exponent <= 1000:  # a product is exact as well, and quicker
+        found = float(number) * ldexp(1.0, exponent)
+        return found, abs(found) < np.inf and found * ldexp(1.0, -exponent) == number
+    found = ldexp(number, exponent)
+    return found, abs(found) < np.inf and ldexp(found, -exponent) == number
+
+
+@kernel
+def question(length, time, t, x, y, vx, vy, wall, t_end):
+    """Return whether a state and a horizon can be taken, and both in the kernel's units; see fast.units."""
+    speed = length - time
+    t_in, is_t_kept = scaled(t, -time)
+    x_in, is_x_kept = scaled(x, -length)
+    y_in, is_y_kept = scaled(y, -length)
+    vx_in, is_vx_kept = scaled(vx, -speed)
+    vy_in, is_vy_kept = scaled(vy, -speed)
+    end, is_end_kept = scaled(t_end, -time)
+    if abs(end) == np.inf and abs(t_end) < np.inf:
+        end, is_end_kept = math.copysign(LARGEST_FLOAT, t_end), True
+    fastest = max(abs(vx_in), abs(vy_in))
+    is_good = t_end >= t and (fastest == 0.0 or fastest >= 1.0 / LARGEST)
+    is_good = is_good and max(abs(x_in), abs(y_in), fastest) <= LARGEST
+    is_good = is_good and is_t_kept and is_x_kept and is_y_kept and is_vx_kept and is_vy_kept and is_end_kept
+    return is_good, Particle(t_in, 0.0, x_in, y_in, vx_in, vy_in, wall), end
+
+
+@kernel
+def answer(length, time, code, dt, particle):
+    """Return a collision, or the place at the horizon, in a scene's units: (code, dt, t, x, y, vx, vy)."""
+    t, speed = particle.t, length - time
+    if code == HORIZON:
+        dt, t = 0.0, 0.0  # neither is asked for
+    dt_out, is_dt_kept = scaled(dt, time)
+    t_out, is_t_kept = scaled(t, time)
+    x_out, is_x_kept = scaled(particle.x, length)
+    y_out, is_y_kept = scaled(particle.y, length)
+    vx_out, is_vx_kept = scaled(particle.vx, speed)
+    vy_out, is_vy_kept = scaled(particle.vy, speed)
+    if not (is_dt_kept and is_t_kept and is_x_kept and is_y_kept and is_vx_kept and is_vy_kept):
+        code = ANSWER_LOST
+    return code, dt_out, t_out, x_out, y_out, vx_out, vy_out
+
+
+@part
+def single_step(step_at, numbers, t, x, y, vx, vy, wall, t_end):
+    """Take a careful step, whose address is given, in a packed scene.
+
+    Returns:
+        (code, dt, t, x, y, vx, vy): a wall's code and the collision there, HORIZON and the place then, or why
+        there is neither.
+    """
+    length = int(numbers[2])
+    time = static_time_inside(length, max(abs(vx), abs(vy))) if np.isnan(numbers[3]) else int(numbers[3])
+    is_good, particle, end = question(length, time, t, x, y, vx, vy, wall, t_end)
+    if not is_good:
+        return REFUSED, 0.0, t, x, y, vx, vy
+    known = particle, end - particle.t, GIVEN, unpack_scene(numbers), np.zeros(ANCHORS_SHAPE)
+    code, dt, particle = run_careful(step_at, known)
+    if code > HORIZON:
+        return (REFUSED if code == OFF_WALL else code), 0.0, t, x, y, vx, vy
+    return answer(length, time, code, dt, particle)
+
 
 QUARTER_TURN, QUARTER_TURN_LOW = math.pi / 2, 6.123233995736766e-17  # pi/2 as two floats
 
@@ -49,7 +164,7 @@ def careful(step_at, scene, anchors, states, walls, t_end, n_times, paths):
 
 @kept(error_model="numpy", nogil=True)
 def fine(scene, anchors, start, wall, limit, out, met, called_off):
-    """Follow a path in pairs of floats: see fast.kernel.refine."""
+    """Follow a path in pairs of floats: see fast.kernel.fine_step."""
     return fine_path(scene, anchors, start, wall, limit, out, met, called_off)
 
 
@@ -64,7 +179,7 @@ def _path(is_slope_moving, form):
 
     @kept(is_slope_moving, form, nogil=True, **HOW)
     def follow_path(worker, walls, paths):
-        """Follow particles one by one from collision to collision: see fast.kernel.path."""
+        """Follow particles one by one from collision to collision: see fast.kernel.one_path."""
         waves, slope = worker.waves if is_waves else None, None if is_slope_moving else worker.slope
         follow_one(worker, walls, paths, waves, slope, terms)
 
@@ -77,13 +192,13 @@ PATHS = {(moves, form): _path(moves, form) for moves in (False, True) for form i
 
 @kept(error_model="numpy")
 def fill_pieces(laws, references, coefficients):
-    """Write the polynomials of all laws about reference times: see fast.kernel.pieces."""
+    """Write the polynomials of all laws about reference times: see fast.kernel.lane_laws."""
     fill_coefficients(laws, references, coefficients, np.zeros(ANCHORS_SHAPE))
 
 
 @kept(error_model="numpy")
 def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
-    """Take one step: see fast.kernel.single."""
+    """Take one step: see `single_step`."""
     return single_step(step_at, numbers, t, x, y, vx, vy, wall, t_end)
 
 

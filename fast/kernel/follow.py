@@ -1,14 +1,20 @@
-"""Following particles to given times: lanes where they are shown right, the careful step elsewhere.
+"""Following particles to given times: lanes where they are shown right, the scalar step elsewhere.
 
 A worker holds LANES particles in two pools: `general` for any collision, and `disk` for captured
 particles, whose base bounces are counted and not stepped; a cap has the disk alone. Every particle's
 numbers depend on that particle only, so threads, chunks and lane positions do not change a bit.
 
 Particles are looked at where their flight passes a *stop*: an instant at which the energy is wanted, a cycle
-ends or the mouth narrows (nu has a local minimum). A captured stay is recorded in the slot of each narrowing
-that it spans, which keeps out the many brief crossings of the edge |sin phi| = nu. A lane cannot hold all
-narrowings, and one is enough: a stay spans some narrowing exactly when it spans the first after its begin.
-SINCE = UNTIL is that one, or the last that has passed while there is none.
+ends or nu has a local minimum. A capture interval is recorded in the slot of each minimum that it spans,
+which keeps out the many brief crossings of the edge |sin phi| = nu. A lane cannot hold all minima, and one is
+enough: an interval spans some minimum exactly when it spans the first after its begin. SINCE = UNTIL is that
+one, or the last that has passed while there is none.
+
+A run can go on with later stops. A last state does not do for that: it lies in the middle of a flight, and a
+flight that begins there is rounded otherwise than the one that passes. Kept is the lane as `attend` meets it,
+before it moves on. Its flight is found again, to the same bits: that depends on the lane alone. The piece of
+the laws is kept by its number and reference time. It is not always the one that serves at the lane's time: a
+flight that ran out of its piece was given another in mid-flight.
 """
 
 from __future__ import annotations
@@ -17,20 +23,56 @@ import numpy as np
 
 from fast.kernel.arithmetic import fma
 from fast.kernel.bounces import captured, count_hit, spin_in_disk, stay_after
-from fast.kernel.codes import ANEW, ARC, HORIZON, N_WALLS, TOO_FAR
 from fast.kernel.compiling import kernel, part
-from fast.kernel.judged import KNOWN
-from fast.kernel.kept import keep_lane, take_lane
-from fast.kernel.lane_laws import know_laws, set_reference
-from fast.kernel.loops import run_careful, run_step
+from fast.kernel.lane_laws import know_laws, set_piece, set_reference
 
 from fast.kernel.pools import (  # isort: skip
-    AS_GIVEN, END, FAR, FATE, LANES, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, ON_ARC, S,
-    SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, TRIES, T_LOW, UNTIL, VX, VY, WALL, WHEN, X, Y,
-    change_lane, load, refold, whole_registers,
+    AS_GIVEN, END, FAR, FATE, LANES, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, N_ROWS,
+    ON_ARC, PIECE, R1, REF, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, TRIES, T_LOW, UNTIL, VX, VY,
+    W0_LOW, WALL, WHEN, X, Y, change_lane, load, refold, whole_registers,
 )  # fmt: skip
-from fast.kernel.records import RADIUS, VALUE, WIDTH, Particle, particle_at, write_state
-from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
+from fast.kernel.records import (  # isort: skip
+    ANEW, ARC, HORIZON, N_WALLS, RADIUS, TOO_FAR, VALUE, WIDTH, Particle, particle_at, write_state,
+)  # fmt: skip
+from fast.kernel.scalar_step import KNOWN
+from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE, run_careful, run_step
+
+# Columns of what is kept: the pool, the number of the next stop, careful steps so far, whether the lanes know
+# the laws; then the rows of the pool up to W0_LOW.
+POOL, NEXT, CAREFUL, IS_KNOWN = np.arange(4)
+FIRST_ROW = 4
+LANE_ROWS = FIRST_ROW + int(W0_LOW // STRIDE)
+
+
+@kernel
+def keep_lane(pool, a, i, roster, is_known, worker):
+    """Keep a lane as it is before it is attended to; of its laws what its form has."""
+    j, followed = roster[PARTICLE, i], worker.followed
+    out = followed.lanes[j]
+    out[:] = 0.0
+    out[POOL], out[NEXT], out[CAREFUL] = pool, roster[NEXT_STOP, i], followed.careful[j]
+    out[IS_KNOWN] = 1.0 if is_known else 0.0
+    last = REF if not is_known else (R1 + STRIDE if worker.degree % 2 == 1 else W0_LOW)
+    for k in range(last // STRIDE):
+        out[FIRST_ROW + k] = a[k * STRIDE + i]
+
+
+@kernel
+def take_lane(a, i, roster, j, worker):
+    """Put a kept particle into a lane, before it is attended to."""
+    kept = worker.followed.lanes[j]
+    for row in range(N_ROWS):
+        a[row * STRIDE + i] = 0.0
+    roster[PARTICLE, i], roster[NEXT_STOP, i] = j, int(kept[NEXT])
+    worker.followed.careful[j] = int(kept[CAREFUL])
+    for k in range(W0_LOW // STRIDE):
+        a[k * STRIDE + i] = kept[FIRST_ROW + k]
+    a[WHEN + i], a[STOP + i], a[END + i] = NEVER, -NEVER, -NEVER
+    if kept[IS_KNOWN] > 0.0 and worker.degree % 2 == 0:
+        set_piece(a, i, int(a[PIECE + i]), worker.scene, worker.pieces, worker.degree)
+    elif kept[IS_KNOWN] > 0.0:
+        a[END + i] = NEVER
+
 
 STAYS, MOVES, ENDS = 0, 1, 2
 

@@ -24,13 +24,14 @@ from fast.kernel.arithmetic import (
     SAFETY,
     TWO_OVER_PI,
     beyond_first_order,
+    fine_sine_cosine,
+    mul,
     sine_cosine,
+    times,
     two_product,
     two_sum,
 )
 from fast.kernel.compiling import kernel, part
-from fast.kernel.double_double import mul, times
-from fast.kernel.double_double import sine_cosine as fine_sine_cosine
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, BANG_BANG, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, IS_SHORT, KIND, KNOTS, LEVEL,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fast.kernel.codes import ARC, BASE, FLOOR, LEFT, RIGHT
 from fast.kernel.compiling import kernel, part
+from fast.kernel.records import ARC, BASE, FLOOR, LEFT, RIGHT
 
 LANES = 128
 # How far rows are apart. Were it a divisor of 4096 bytes, rows would meet in few sets of the cache, and a
@@ -34,7 +34,7 @@ NEVER = np.inf
     BEFORE, MEAN_RATE,
     LAWS,  # from here on the coefficients of a piece: see Pieces.coefficients
 ) = STRIDE * np.arange(62)  # fmt: skip
-SINE, COSINE = R0, R1
+PHASE_SINE, PHASE_COSINE = R0, R1
 N_COEFFICIENTS = 16  # of each law, as many as the highest degree asks for
 N_ROWS = 61 + 4 * N_COEFFICIENTS
 RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * np.arange(4)

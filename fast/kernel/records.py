@@ -1,7 +1,8 @@
 """What kernels are given and hand back, and the names of the columns of their tables of numbers.
 
 numba reads a named tuple as cheaply as loose arguments. The numbers of all laws are rows of one array,
-because a row is chosen while a kernel runs; its columns are named here and nowhere else.
+because a row is chosen while a kernel runs; its columns are named here and nowhere else. Walls, outcomes and
+tables are numpy integers, because numba compiles a function anew for each Python integer passed to it.
 """
 
 from __future__ import annotations
@@ -11,8 +12,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast.kernel.codes import N_WALLS, NO_WALL
 from fast.kernel.compiling import kernel
+
+NO_WALL, ARC, BASE, LEFT, RIGHT, FLOOR = np.arange(-1, 5)
+N_WALLS = 5
+HORIZON, SLIDING, MOUTH_EDGE, ON_CORNER = np.array([10, 20, 21, 22])
+FAR_TIME, TOO_MANY, TANGENT, CORNER, EDGE, START, AT_END, TOO_FAR = np.arange(31, 39)
+# A refused state moves into the wall that it leaves, or lies beyond a wall: BEYOND plus that wall's code; or
+# it is off the wall that it names. ANEW is no end: a particle that cannot go on from where it was kept, and
+# is to be followed from its start.
+APPROACHING, BEYOND, ANEW, OFF_WALL = np.array([40, 41, 50, 52])
+CAP, STEM, MUSHROOM = np.arange(3)
+
 
 FloatArray = npt.NDArray[np.floating[Any]]
 IntArray = npt.NDArray[np.int64]
@@ -132,7 +143,7 @@ class LawsInLanes(NamedTuple):
     Attributes:
         compiled: the scene's numbers.
         pieces: its laws as polynomials; of waves their period alone, and up to when they are known.
-        degree: of the polynomials, PARABOLA or SERIES of fast.kernel.pieces; or ONE_WAVE or TWO_WAVES.
+        degree: of the polynomials, PARABOLA or SERIES of fast.kernel.lane_laws; or ONE_WAVE or TWO_WAVES.
         slope: of the sides; None where it moves.
         waves: its laws as waves.
     """
@@ -244,7 +255,7 @@ class Followed(NamedTuple):
             stem has been met since.
         t_in, t_out: (N, K, M) the captured stays that are kept; nan for none.
         lanes: (N, LANE_ROWS) what goes on from the last stop, nan for who ended before it: see
-            fast.kernel.kept; (N, 0) where nobody asks for it.
+            fast.kernel.follow; (N, 0) where nobody asks for it.
     """
 
     states: FloatArray

@@ -1,20 +1,181 @@
-"""What a thread holds while it follows particles: the scene, its pools, and what it fills in."""
+"""What a thread holds while it follows particles: the scene, its pools, and the loops over lanes.
+
+The loops and the scalar step are compiled each by itself and called by address. numba compiles all that a
+function calls into it, again for every caller: a run needs one of eight loops `fly` (by the form of the laws,
+and whether the slope stands still), and each caller of the scalar step would hold another copy of it. So
+these are compiled once, kept on disk, and called as C calls a function pointer; that costs some nanoseconds
+for a pool of lanes. numba converts arguments to the signature that the caller names; `address` checks that
+the callee has it, too.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import config, types
+from numba.core.typing import Signature
+from numba.core.typing import signature as returns
 
-from fast.kernel.codes import CAP, MUSHROOM, STEM
-from fast.kernel.limits import LawLimits, limits_of
-from fast.kernel.loops import Loops, loops_of
+from fast.kernel.arithmetic import SAFETY
+from fast.kernel.compiling import HOW, caller, kept
+from fast.kernel.lane_laws import DEGREES, NO_WAVES, ONE_WAVE, TWO_WAVES
+from fast.kernel.lanes import chord, fly
 from fast.kernel.pools import LANES, POOL_SIZE
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawsInLanes, Pieces, Stops,
-    TableOfLanes, LaneWaves,
+    ANCHORS_SHAPE, BEND, CAP, DEPTH, FASTEST, HIGHEST, LOWEST, MUSHROOM, RADIUS, SLOPE, STEM, WIDTH,
+    Compiled, FloatArray, Followed, IntArray, LaneWaves, LawsInLanes, Particle, Pieces, Stops, TableOfLanes,
 )  # fmt: skip
+from fast.kernel.scalar_step import judged_step
+from scene.states import ON_WALL
+
+LEAST_RADIUS = 2.0**-1000
+
+
+class LawLimits(NamedTuple):
+    """What holds of a scene's laws for all time, for the lanes' checks.
+
+    Attributes:
+        bend: at least |r'^2 + r r''|: half of what the arc's function may curve upwards, speed left out.
+        curvature: at least |w''| + |m''| h and |h''|, for a slope m.
+        turning: at least 2 |m'|, which comes times |vy| to a side's curvature.
+        rate: at least |r'|, |w'| + |m'| h and |h'|.
+        arc_rate: at least |r'|.
+        size: at least r + w + (1 + |m|) h, which bounds the terms that a wall's function is summed of.
+        lean: at least 1 + |m|.
+        least_r, least_h: at most the least radius and depth. Where a bound says no more than that the
+            radius is positive it is LEAST_RADIUS, with which only concave arcs pass.
+    """
+
+    bend: float
+    curvature: float
+    turning: float
+    rate: float
+    arc_rate: float
+    size: float
+    lean: float
+    least_r: float
+    least_h: float
+
+
+def limits_of(scene: Compiled) -> LawLimits:
+    """Return the limits of a scene's laws."""
+    r, w, h, m = (scene.bounds[row] for row in (RADIUS, WIDTH, DEPTH, SLOPE))
+    grow = 1.0 + SAFETY
+    lean = 1.0 + max(abs(m[LOWEST]), abs(m[HIGHEST]))
+    found = (
+        grow * (r[HIGHEST] * r[BEND] + r[FASTEST] * r[FASTEST]),
+        grow * max(w[BEND] + m[BEND] * h[HIGHEST], h[BEND]),
+        2.0 * m[FASTEST],
+        grow * max(r[FASTEST], w[FASTEST] + m[FASTEST] * h[HIGHEST], h[FASTEST]),
+        grow * r[FASTEST],
+        grow * (r[HIGHEST] + w[HIGHEST] + lean * h[HIGHEST]),
+        grow * lean,
+        max(r[LOWEST], LEAST_RADIUS),
+        max(h[LOWEST], 0.0),
+    )
+    return LawLimits(*map(float, found))
+
+
+_WHOLE, _REAL, _TRUTH = types.int64, types.float64, types.boolean
+_TABLE = types.float64[:, ::1]
+POOL = types.float64[::1]
+LIMITS = types.NamedUniTuple(_REAL, len(LawLimits._fields), LawLimits)
+SCENE = types.NamedTuple((_WHOLE, _TRUTH, _TABLE, _TABLE), Compiled)
+PARTICLE = types.NamedTuple((_REAL,) * 6 + (_WHOLE,), Particle)
+TABLE = types.NamedUniTuple(_TRUTH, len(TableOfLanes._fields), TableOfLanes)
+WAVES = types.NamedTuple(
+    (_REAL, _REAL, *(types.UniTuple(_REAL, len(law)) for law in NO_WAVES[2:])), LaneWaves
+)
+
+# Of both loops: the pool, how many lanes, and what the scene is.
+STEP = returns(types.none, POOL, _WHOLE, TABLE, WAVES, _REAL, LIMITS)
+CAREFUL = returns(types.Tuple((_WHOLE, _REAL, PARTICLE)), PARTICLE, _REAL, _WHOLE, SCENE, _TABLE)
+
+run_step, run_careful = caller(STEP), caller(CAREFUL)
+
+
+class Loops(NamedTuple):
+    """Addresses of the compiled loops that serve a scene; without the compiler, the functions themselves.
+
+    Attributes:
+        careful: the careful step.
+        fly: a step of each lane.
+        chord: the same for captured particles.
+    """
+
+    careful: int
+    fly: int
+    chord: int
+
+
+@kept(ON_WALL, **HOW)
+def careful_step(particle, limit, origin, scene, anchors):
+    """Judge a particle as its origin asks, and take a careful step: see fast.kernel.scalar_step."""
+    return judged_step(particle, limit, origin, scene, anchors)
+
+
+def _fly(is_slope_moving, form):
+    terms, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
+
+    @kept(is_slope_moving, form, **HOW)
+    def fly_lanes(a, n, table, waves, slope, limits):
+        """See fast.kernel.lanes.fly."""
+        fly(a, n, table, waves if is_waves else None, None if is_slope_moving else slope, terms, limits)
+
+    return fly_lanes
+
+
+def _chord(form):
+    terms, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
+
+    @kept(form, **HOW)
+    def chord_lanes(a, n, table, waves, slope, limits):
+        """See fast.kernel.lanes.chord."""
+        chord(a, n, table, waves if is_waves else None, slope, terms, limits)
+
+    return chord_lanes
+
+
+# By the form of the laws, and whether the slope moves.
+FORMS = (ONE_WAVE, TWO_WAVES, *DEGREES)
+FLIES = {(moves, form): _fly(moves, form) for moves in (False, True) for form in FORMS}
+CHORDS = {form: _chord(form) for form in FORMS}
+
+
+def address(entry: Any, signature: Signature) -> Any:
+    """Compile an entry, or load it from the disk cache, and return its address.
+
+    Raises:
+        TypeError: what it returns is not what the signature says.
+    """
+    if config.DISABLE_JIT:
+        return entry
+    entry.compile(signature.args)
+    found = entry.overloads[signature.args]
+    if found.signature.return_type != signature.return_type:
+        raise TypeError(f"{entry.py_func.__name__} returns {found.signature.return_type}")
+    return found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+
+
+@cache
+def careful_at() -> Any:
+    """Compile the careful step, or load it, and return its address."""
+    return address(careful_step, CAREFUL)
+
+
+@cache
+def loops_for(is_slope_moving: bool, form: int) -> Loops:
+    """Compile the loops for scenes of such a slope and laws of such a form, or load them."""
+    return Loops(careful_at(), address(FLIES[is_slope_moving, form], STEP), address(CHORDS[form], STEP))
+
+
+def loops_of(in_lanes: LawsInLanes) -> Loops:
+    """Return the compiled loops that serve a scene."""
+    return loops_for(in_lanes.slope is None, in_lanes.degree)
+
 
 CACHE_LINE = 64  # bytes
 GENERAL, DISK = np.arange(2)  # pools

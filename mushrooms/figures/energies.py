@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import theory
-from fast.given import given_energy
+from fast.validation import given_energy
 from mushrooms.compared import begins_widest, predicted
 from mushrooms.figures import style as plots
 from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, FloatArray, new_figure

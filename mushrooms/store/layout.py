@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fast import Ensemble, Paused
-from fast.kernel.kept import LANE_ROWS
+from fast.kernel.follow import LANE_ROWS
 from mushrooms.store.spec import RunSpec
 from scene import Mushroom
 from scene.mouth import narrowings

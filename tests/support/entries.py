@@ -5,11 +5,11 @@ from __future__ import annotations
 from numba.core.dispatcher import Dispatcher
 
 from fast import batch
-from fast.kernel import entries, loops
+from fast.kernel import entries, worker
 
 
 def kept_entries() -> list[Dispatcher]:
     """Return all that modules of ours name, by themselves or in a table."""
-    named = [found for module in (entries, loops, batch) for found in vars(module).values()]
+    named = [found for module in (entries, worker, batch) for found in vars(module).values()]
     found = named + [entry for table in named if isinstance(table, dict) for entry in table.values()]
     return [entry for entry in found if isinstance(entry, Dispatcher) and entry.stats.cache_path]

@@ -22,7 +22,7 @@ from mpmath import fp
 
 from fast.batch import LaneRound, as_particle, residual
 from fast.fine import fill_path
-from fast.kernel import codes, lanes, pools
+from fast.kernel import lanes, pools, records
 from fast.kernel.records import DEPTH, RATE, FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.laws import value
@@ -106,11 +106,11 @@ class Round(LaneRound):
         q, total, is_folded = p.copy(), 0.0, False
         if self.is_disk and q[3] < 0.0:
             q[3], q[5], is_folded = -q[3], -q[5], True
-        code = codes.NO_WALL
+        code = records.NO_WALL
         for _ in range(2):
             code, dt, q = self.careful_step(q, wall)
             total += dt
-            if not self.is_disk or code != codes.BASE:
+            if not self.is_disk or code != records.BASE:
                 break
             wall, is_folded = int(code), not is_folded
         if is_folded:
@@ -119,7 +119,7 @@ class Round(LaneRound):
 
     def is_floor_met_at_once(self, p: FloatArray) -> bool:
         """Tell whether a start is above the floor by no more than rounding, in pairs of floats, and falls."""
-        f, error = residual(as_particle(p, int(codes.FLOOR)), self.compiled, self.anchors)
+        f, error = residual(as_particle(p, int(records.FLOOR)), self.compiled, self.anchors)
         return bool(0.0 < f <= error and p[5] + self.anchors[DEPTH, RATE] < 0.0)
 
     def ulps(self, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray) -> float | None:
@@ -212,10 +212,10 @@ def try_starts(
         for i in np.flatnonzero(is_live):
             p, wall = begun[i]
             code, truth = pool.careful(p, wall)
-            if code == codes.START:  # the careful step cannot tell whether it is inside its walls
+            if code == records.START:  # the careful step cannot tell whether it is inside its walls
                 tally["starts at a corner"] += 1
                 is_live[i] = False
-                if hits[i] != codes.FLOOR and pool.is_floor_met_at_once(p):
+                if hits[i] != records.FLOOR and pool.is_floor_met_at_once(p):
                     found.append(
                         Wrong(scene, p.tolist(), wall, (int(hits[i]), numbers[i].tolist()), (code, []))
                     )
@@ -261,7 +261,7 @@ def error_of(
 def is_valid(pool: Round, p: FloatArray, wall: int) -> bool:
     """Tell whether the careful step takes a start."""
     code, _, _ = pool.careful_step(p, wall)
-    return bool(code < codes.APPROACHING)
+    return bool(code < records.APPROACHING)
 
 
 def state_in(pool: Round, i: int) -> tuple[FloatArray, int]:
@@ -328,7 +328,7 @@ def draw_start(scene: Scene, random: np.random.Generator) -> tuple[FloatArray, i
     along, away = 10.0 ** random.uniform(-3, 1.5, 2) * random.choice([1.0, 1.0, 0.03])
     along *= random.choice([-1.0, 1.0])
     wall = int(random.choice(_walls_of(scene), p=_SHARES[len(_walls_of(scene))]))
-    if wall == codes.ARC:
+    if wall == records.ARC:
         angle = random.uniform(0.0, np.pi) if random.random() < 0.7 else 10.0 ** random.uniform(-3, 0)
         out = rate["r"] - away
         bend = float(value(fp, laws(scene)["r"], t, 2))
@@ -344,24 +344,24 @@ def draw_start(scene: Scene, random: np.random.Generator) -> tuple[FloatArray, i
         place = (now["r"] * e_x, now["r"] * e_y, out * e_x - along * e_y, out * e_y + along * e_x)
         return np.array([t, 0.0, *place]), wall
     w, w_rate = _mouth(scene, t)
-    if wall == codes.BASE:
+    if wall == records.BASE:
         is_top = isinstance(scene, Stem)
         x = w * random.uniform(-1, 1) if is_top else w + (now["r"] - w) * random.random()
         return np.array([t, 0.0, x, 0.0, along, -away if is_top else away]), wall
-    if wall == codes.FLOOR:
+    if wall == records.FLOOR:
         at = (w - now["slope"] * now["h"]) * random.uniform(-1, 1)
         return np.array([t, 0.0, at, -now["h"], along, away - rate["h"]]), wall
     y = -now["h"] * random.random()
-    sign = 1.0 if wall == codes.RIGHT else -1.0
+    sign = 1.0 if wall == records.RIGHT else -1.0
     out = w_rate + rate["slope"] * y + now["slope"] * along - away
     return np.array([t, 0.0, sign * (w + now["slope"] * y), y, sign * out, along]), wall
 
 
 def _walls_of(scene: Scene) -> npt.NDArray[np.int64]:
     if isinstance(scene, Cap):
-        return np.array([codes.ARC])
-    below = [codes.BASE, codes.LEFT, codes.RIGHT, codes.FLOOR]
-    return np.array(below if isinstance(scene, Stem) else [codes.ARC, *below])
+        return np.array([records.ARC])
+    below = [records.BASE, records.LEFT, records.RIGHT, records.FLOOR]
+    return np.array(below if isinstance(scene, Stem) else [records.ARC, *below])
 
 
 _SHARES = {1: [1.0], 4: [0.25] * 4, 5: [0.6, 0.1, 0.1, 0.1, 0.1]}

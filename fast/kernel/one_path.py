@@ -10,20 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fast.kernel.aiming import (
-    arc_quotient,
-    cube_of_arc,
-    mouth_crossing,
-    nearest_below,
-    outset_of,
-    side_bend,
-    side_curvature,
+from fast.kernel.aiming import (  # isort: skip
+    arc_quotient, cube_of_arc, mouth_crossing, nearest_below, outset_of, side_bend, side_curvature,
     side_rate,
-)
+)  # fmt: skip
 from fast.kernel.arithmetic import fma
 from fast.kernel.bounces import ONE
-from fast.kernel.careful import NEAR
-from fast.kernel.codes import HORIZON
 from fast.kernel.compiling import packed, part
 from fast.kernel.follow import careful_flight, knows_laws, land_carefully
 from fast.kernel.lane_laws import laws_in, look_ahead, set_reference
@@ -33,7 +25,10 @@ from fast.kernel.pools import (  # isort: skip
     COARSE, END, FAR, FATE, HIT, MARKED, MAX_CORRECTIONS, MOVED, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT,
     ON_RIGHT, R0, S, STOP, SURE, T, TRIES, T_LOW, VX, VY, WALL, X, Y, load,
 )  # fmt: skip
-from fast.kernel.records import Particle, TableOfLanes, particle_at, write_state, write_step
+from fast.kernel.records import (  # isort: skip
+    HORIZON, Particle, TableOfLanes, particle_at, write_state, write_step,
+)  # fmt: skip
+from fast.kernel.scalar_step import NEAR
 from fast.kernel.worker import GENERAL
 
 FIRST = np.int64(0)  # the lane in use

@@ -16,17 +16,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.kernel.arithmetic import two_sum
-from fast.kernel.careful import first_event
-from fast.kernel.codes import ARC, BASE, BEYOND, FAR_TIME, FLOOR, HORIZON, NO_WALL, RIGHT, TANGENT
+from fast.kernel.arithmetic import add, div, fine_sine_cosine, mul, sub, times, two_sum
 from fast.kernel.compiling import kernel, part
-from fast.kernel.double_double import add, div, mul, sine_cosine, sub, times
 from fast.kernel.laws import set_anchors
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, BANG_BANG, DEPTH, FOURIER, KIND, KNOTS, LEVEL, N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD,
-    PERIOD_LOW, PHASE, PHASE_ERROR, RADIUS, SHARED, SLOPE, WIDTH, Particle,
+    AMPLITUDES, ARC, BANG_BANG, BASE, BEYOND, DEPTH, FAR_TIME, FLOOR, FOURIER, HORIZON, KIND, KNOTS, LEVEL,
+    NO_WALL, N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, PHASE, PHASE_ERROR, RADIUS, RIGHT,
+    SHARED, SLOPE, TANGENT, WIDTH, Particle,
 )  # fmt: skip
+from fast.kernel.scalar_step import first_event
 from fast.kernel.walls import crossed_wall
 
 MAX_CORRECTIONS = 8
@@ -95,7 +94,7 @@ def law(laws, row, t):
         n = int(laws[row, N_HARMONICS])
         f, rate = (laws[row, LEVEL], 0.0), ZERO
         for k in range(1, n + 1):
-            sine, cosine, _ = sine_cosine(phase(laws, row, float(k), t))
+            sine, cosine, _ = fine_sine_cosine(phase(laws, row, float(k), t))
             a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
             f = add(f, add(times(a, cosine), times(b, sine)))
             rate = add(rate, times(float(k), sub(times(b, cosine), times(a, sine))))
@@ -115,8 +114,8 @@ def increment(laws, row, t, s):
         n, change = int(laws[row, N_HARMONICS]), ZERO
         for k in range(1, n + 1):
             half = phase(laws, row, 0.5 * k, s)
-            sine, cosine, _ = sine_cosine(add(phase(laws, row, float(k), t), half))
-            across, _, _ = sine_cosine(half)
+            sine, cosine, _ = fine_sine_cosine(add(phase(laws, row, float(k), t), half))
+            across, _, _ = fine_sine_cosine(half)
             a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
             change = add(change, mul(times(2.0, across), sub(times(b, cosine), times(a, sine))))
         return change

@@ -16,18 +16,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast.kernel import entries, records
-from fast.kernel.follow import LANE_ROWS
+from fast.kernel import records
+from fast.kernel.follow import LANE_ROWS, follow_particles
 from fast.kernel.records import FloatArray, Followed, IntArray, LawsInLanes, Stops, unfilled_ends
+from fast.kernel.single import LARGEST
 from fast.kernel.worker import is_known_throughout, new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import cycle_stops, initial_states, least_collisions, one_cycle
 from fast.threads import awaited, interruptible
-from fast.units import Units, fit, inward
+from fast.units import Units, fit, inward, outward
 
 from fast.validation import (  # isort: skip
-    MAX_CYCLES, MAX_FIRST, MAX_PARTICLES, MOST_IN_CYCLES, check_kept, given_energy, given_phases,
-    given_progress, given_threads,
+    MAX_CYCLES, MAX_FIRST, MAX_PARTICLES, MOST_IN_CYCLES, check_kept, check_energy, check_phases,
+    check_progress, check_threads,
 )  # fmt: skip
 from scene import Scene, check_scene
 from scene.mouth import narrowings
@@ -261,8 +262,11 @@ class Plan(NamedTuple):
     def ensemble(self, done: Followed, seconds: float) -> Ensemble:
         """Name what the kernel filled in for some particles."""
         units, every = self.units, (-1, *self.size[1:])
-        energies, captured = units.energies(done.energies).reshape(every), done.is_captured.reshape(every)
-        columns = [units.times(done.states[:, 0]), *units.places(done.states[:, 2:]).T]
+        energies, captured = (
+            outward(done.energies, units.of_energy()).reshape(every),
+            done.is_captured.reshape(every),
+        )
+        columns = outward(np.delete(done.states, 1, axis=1), units.of_step()[1:]).T
         t, x, y, vx, vy = (np.ascontiguousarray(column) for column in columns)
         return Ensemble(
             energy0=self.energy0,
@@ -275,8 +279,8 @@ class Plan(NamedTuple):
             vy=vy,
             n_collisions=done.counts.sum(axis=1),
             outcome=outcomes(done.codes),
-            t_in=units.times(done.t_in),
-            t_out=units.times(done.t_out),
+            t_in=outward(done.t_in, units.time),
+            t_out=outward(done.t_out, units.time),
             wall_counts=done.counts,
             phase_energies=energies[:, :, :-1],
             phase_captured=captured[:, :, :-1],
@@ -307,19 +311,19 @@ def planned(
     n_cycles = check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
     seed = check_count("seed", seed, 0, 2**64 - 1)
     first = check_count("first", first, 0, MAX_FIRST)
-    energy, phases = given_energy(energy), given_phases(phases)
-    threads, progress = given_threads(threads), given_progress(progress)
+    energy, phases = check_energy(energy), check_phases(phases)
+    threads, progress = check_threads(threads), check_progress(progress)
     fitted = fit(scene)
     # A static table is followed for units of the caller's time.
     units = Units(fitted.length, fitted.time or 0)
-    scene, speed2 = fitted.scene, 2.0 * inward("energy", energy, 2 * (units.length - units.time))
+    scene, speed2 = fitted.scene, 2.0 * inward("energy", energy, units.of_energy())
     check_kept(n_particles, n_cycles, len(phases), len(narrowings(scene)))
     ahead = least_collisions(scene, math.sqrt(speed2), n_cycles * one_cycle(scene))
     if ahead > MOST_IN_CYCLES:
         raise BadInput(
             f"energy = {energy}: over {ahead:.0e} collisions of each particle, must be at most 1e9"
         )
-    if speed2 < entries.LARGEST**-2:
+    if speed2 < LARGEST**-2:
         raise BadInput(
             f"energy = {energy}: the speed must be at least 2^-400 beside the table's size and period"
         )
@@ -372,7 +376,7 @@ def follow(
     def work(first: int) -> None:
         part = slice(first, first + size)
         worker = new_worker(in_lanes, stops, followed.part(part), n_passed)
-        entries.follow_particles(worker, walls[part])
+        follow_particles(worker, walls[part])
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
     if progress:
@@ -436,7 +440,7 @@ def go_on(
             size; or the cycles reach a time at which the lanes no longer resolve the phases of the laws.
     """
     plan = planned(scene, n_particles, energy, n_cycles, seed, first, threads, phases, progress)
-    own: dict[str, Any] = {"seed": plan.seed, "first": plan.first, "phases": given_phases(phases)}
+    own: dict[str, Any] = {"seed": plan.seed, "first": plan.first, "phases": check_phases(phases)}
     asked = {"table": type(scene).__name__, **laws(scene), **own}
     if before is None:
         done, seconds = plan.followed(plan.starts(), LANE_ROWS)

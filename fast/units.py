@@ -25,7 +25,7 @@ import numpy as np
 
 from fast.kernel import records
 from fast.kernel.arithmetic import half_pi
-from fast.kernel.entries import LARGEST, LENGTH, TIME, pack_scene, static_time
+from fast.kernel.single import LARGEST, LENGTH, TIME, pack_scene, static_time
 
 from fast.kernel.records import (  # isort: skip
     BANG_BANG, CONSTANT, FOURIER, KIND, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, BoolArray, Compiled,
@@ -136,7 +136,6 @@ def _product_bounds(factors: tuple[Law, ...]) -> Bounds:
     )
 
 
-FARTHEST = 1000  # powers of two up to this, and their inverses, are floats
 ANSWER_LOST = "the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023"
 
 
@@ -160,9 +159,8 @@ class Units(NamedTuple):
         Raises:
             InvalidState: it is too fast or too slow for its table, or loses bits beside the table's size.
         """
-        speed = self.length - self.time
-        exponents = {"t": self.time, "x": self.length, "y": self.length, "vx": speed, "vy": speed}
-        inner = {name: inward(f"state.{name}", getattr(state, name), e) for name, e in exponents.items()}
+        exponents = zip(("t", "x", "y", "vx", "vy"), self.of_step()[1:].tolist(), strict=True)
+        inner = {name: inward(f"state.{name}", getattr(state, name), e) for name, e in exponents}
         for name in ("x", "y", "vx", "vy"):
             if not abs(inner[name]) <= LARGEST:
                 raise InvalidState(
@@ -188,46 +186,14 @@ class Units(NamedTuple):
             return math.copysign(sys.float_info.max, t_end)
         return inward("t_end", t_end, self.time)
 
-    def steps(self, rows: FloatArray) -> FloatArray:
-        """Return rows of [dt, t, x, y, vx, vy], each a number or a pair, in the scene's units."""
-        exponents = self._of_step()
-        return outward(rows, exponents if rows.shape[-1] == 6 else exponents[:, None])
-
-    def keeps(self, rows: FloatArray) -> BoolArray:
-        """Tell which of N rows of ([dt,] t, x, y, vx, vy) lose no bit in the scene's units."""
-        _, is_kept = scaled(rows, self._of_step()[-rows.shape[-1] :])
-        return np.asarray(is_kept.all(axis=1))
-
-    def keeps_times(self, rows: FloatArray) -> BoolArray:
-        """Tell which of N rows of times lose no bit in the scene's units; nan stands for none."""
-        _, is_kept = scaled(rows, np.array(self.time))
-        return np.asarray(is_kept.all(axis=1))
-
-    def n_exact(self, rows: FloatArray) -> int:
-        """Return how many of N rows of [dt, t, x, y, vx, vy] come before the first that loses a bit."""
-        return int(np.append(self.keeps(rows), False).argmin())
-
-    def factors(self) -> FloatArray | None:
-        """Return by what dt, t, x, y, vx, vy are multiplied; None where no product does it."""
-        exponents = self._of_step()
-        return np.ldexp(1.0, exponents) if int(np.abs(exponents).max()) <= FARTHEST else None
-
-    def _of_step(self) -> IntArray:
+    def of_step(self) -> IntArray:
+        """Return the exponents of dt, t, x, y, vx, vy, each times a power of two in the kernel."""
         speed = self.length - self.time
         return np.array([self.time, self.time, self.length, self.length, speed, speed])
 
-    def places(self, rows: FloatArray) -> FloatArray:
-        """Return rows of [x, y, vx, vy] in the scene's units."""
-        speed = self.length - self.time
-        return outward(rows, np.array([self.length, self.length, speed, speed]))
-
-    def times(self, numbers: FloatArray) -> FloatArray:
-        """Return times in the scene's units."""
-        return outward(numbers, np.array(self.time))
-
-    def energies(self, numbers: FloatArray) -> FloatArray:
-        """Return energies, squares of speeds, in the scene's units."""
-        return outward(numbers, np.array(2 * (self.length - self.time)))
+    def of_energy(self) -> int:
+        """Return the exponent of an energy, the square of a speed."""
+        return 2 * (self.length - self.time)
 
 
 class Fitted(NamedTuple):
@@ -311,14 +277,14 @@ def inward(field: str, number: float, exponent: int) -> float:
     raise refusal(f"{field} = {number!r}, must be {bound} beside the table's size and period")
 
 
-def scaled(numbers: FloatArray, exponents: IntArray) -> tuple[FloatArray, BoolArray]:
+def scaled(numbers: FloatArray, exponents: IntArray | int) -> tuple[FloatArray, BoolArray]:
     """Return kernel numbers times 2^exponents, and which of them lost no bit; infinity and nan lose none."""
     with np.errstate(over="ignore", under="ignore"):
         found = np.ldexp(numbers, exponents)
         return found, (np.ldexp(found, -exponents) == numbers) | ~np.isfinite(numbers)
 
 
-def outward(numbers: FloatArray, exponents: IntArray) -> FloatArray:
+def outward(numbers: FloatArray, exponents: IntArray | int) -> FloatArray:
     """Return kernel numbers times 2^exponents, exactly; infinities and nans as they are.
 
     Raises:

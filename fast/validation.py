@@ -1,6 +1,6 @@
-"""What the public entries are given, checked before any arithmetic: types, nan, infinities, sizes.
+"""Arguments of the public functions, checked before any arithmetic: types, nan, infinities, sizes.
 
-Each check returns what it was given as the kernels take it (floats, integers), or raises BadInput with one
+Each check returns its argument as the kernels take it (floats, integers), or raises BadInput with one
 line that names field, value and bound.
 """
 
@@ -26,7 +26,7 @@ LARGEST_ENERGY = 2.0**800
 NUMBERS = ("t", "x", "y", "vx", "vy")
 
 
-def given_state(scene: Scene, state: object) -> State:
+def check_state(scene: Scene, state: object) -> State:
     """Return a state whose numbers are floats; `scene.states.check_numbers` looks at their sizes.
 
     Raises:
@@ -45,27 +45,31 @@ def given_state(scene: Scene, state: object) -> State:
     return State(t, x, y, vx, vy, wall)
 
 
-def given_end(t_end: object) -> float:
+def check_end(t_end: object) -> float:
     """Return a horizon, a number or infinity for none."""
     is_infinite = isinstance(t_end, numbers.Real) and t_end == math.inf
     return math.inf if is_infinite else check_number("t_end", t_end)
 
 
-def given_states(scene: Scene, states: object) -> list[State]:
+def check_states(scene: Scene, states: object) -> list[State]:
     """Return states whose numbers are floats; InvalidState names the particle."""
-    given = listed(states)
-    if isinstance(given, str | bytes) or not isinstance(given, Sequence):
-        raise BadInput(f"states = {shown(states)}, must be a sequence of State")
     found = []
-    for i, state in enumerate(given):
+    for i, state in enumerate(_check_sequence("states", states, "State")):
         try:
-            found.append(given_state(scene, state))
+            found.append(check_state(scene, state))
         except BadInput as error:
             raise InvalidState(f"particle {i}: {error}") from None
     return found
 
 
-def given_energy(energy: object) -> float:
+def _check_sequence(field: str, value: object, of_what: str) -> Sequence[object]:
+    given = listed(value)
+    if isinstance(given, str | bytes) or not isinstance(given, Sequence):
+        raise BadInput(f"{field} = {shown(value)}, must be a sequence of {of_what}")
+    return given
+
+
+def check_energy(energy: object) -> float:
     """Return an energy in the bounds that squares allow."""
     found = check_number("energy", energy)
     if not 0.0 < found <= LARGEST_ENERGY:
@@ -73,24 +77,22 @@ def given_energy(energy: object) -> float:
     return found
 
 
-def given_phases(phases: object) -> tuple[float, ...]:
+def check_phases(phases: object) -> tuple[float, ...]:
     """Return fractions of a cycle that rise and lie in (0, 1)."""
-    given = listed(phases)
-    if isinstance(given, str | bytes) or not isinstance(given, Sequence):
-        raise BadInput(f"phases = {shown(phases)}, must be a sequence of numbers that rise and lie in (0, 1)")
+    given = _check_sequence("phases", phases, "numbers that rise and lie in (0, 1)")
     found = tuple(check_number(f"phases[{i}]", phase) for i, phase in enumerate(given))
     if any(not a < b for a, b in pairwise([0.0, *found, 1.0])):
         raise BadInput(f"phases = {shown(list(found))}, must rise and lie in (0, 1)")
     return found
 
 
-def given_threads(threads: object) -> int:
+def check_threads(threads: object) -> int:
     """Return how many threads to use: as many as asked for, by default one for each core."""
     available = os.cpu_count() or 1
     return available if threads is None else check_count("threads", threads, 1, available)
 
 
-def given_progress(progress: object) -> Callable[[int], None] | None:
+def check_progress(progress: object) -> Callable[[int], None] | None:
     """Return what is to be called with the number of particles done, or None."""
     if progress is not None and not callable(progress):
         raise BadInput(f"progress = {shown(progress)}, must be None or a function of one whole number")

@@ -171,12 +171,12 @@ def _check_ensemble(energy: float, cycles: int, seed: int, threads: int | None) 
 
 
 def _given_phases(text: str | None) -> tuple[float, ...]:
-    from fast.validation import given_phases
+    from fast.validation import check_phases
 
     if text is None:
         return ()
     try:
-        return given_phases([float(part) for part in text.split(",")])
+        return check_phases([float(part) for part in text.split(",")])
     except (BadInput, ValueError):
         raise BadInput(f"--phases = {text}, must be numbers that rise and lie in (0, 1)") from None
 

@@ -18,9 +18,10 @@ import reference
 from conformance.grading.agreement import compare
 from conformance.grading.agreement import exact as enclosed
 from conformance.strategies import scenes_and_states
-from fast.fine import fill_path
 from fast.kernel import arithmetic as dd
 from fast.kernel import records
+from fast.kernel.fine_step import fine_path
+from fast.kernel.records import ANCHORS_SHAPE
 from fast.step import WALL_CODES
 from fast.units import compile_scene
 from scene import Collision, Mushroom, State, Stem, Undecided, load
@@ -156,5 +157,7 @@ def test_rounding_a_state_of_pairs_is_not_taken_for_a_gap():
     scene, d = Stem(w=1.0, h=1.0), round(1e-10 * 2**53) * 2.0**-53
     start = np.array([[0.0, 0.0], [1.0 - d, 0.0], [d - 1.0, -5e-17], [1.0, 0.0], [2e-7 - 1.0, 0.0]])
     steps, met = np.empty((1, 6, 2)), np.empty(1, dtype=np.int64)
-    n, code = fill_path(compile_scene(scene), start, WALL_CODES[None], steps, met)
+    anchors, called_off = np.zeros(ANCHORS_SHAPE), np.zeros(1, np.int64)
+    compiled, wall = compile_scene(scene), WALL_CODES[None]
+    n, code = fine_path(compiled, anchors, start, wall, np.inf, steps, met, called_off)
     assert (n, code) == (0, records.CORNER)

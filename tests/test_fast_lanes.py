@@ -16,6 +16,7 @@ from numba import njit, types
 from support.depth import deep_but
 
 import fast
+from fast.batch import followed_paths
 from fast.kernel import worker
 from fast.kernel.compiling import HOW, TOOLS
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
@@ -25,7 +26,7 @@ from fast.kernel.records import TableOfLanes
 from fast.kernel.worker import CACHE_LINE, LawLimits, new_pools
 from fast.pieces import PARABOLA, SERIES
 from fast.starts import initial_states
-from fast.step import WALL_CODES, followed_paths
+from fast.step import WALL_CODES
 from fast.units import compile_scene
 from scene import BangBang, Cap, Fourier, State, load
 
@@ -71,7 +72,7 @@ def test_the_width_of_registers_changes_no_bit(step):
 
 def test_an_address_is_refused_to_who_expects_another_result():
     """Called all the same, it would write over what is not its own."""
-    with pytest.raises(TypeError, match="chord_lanes returns none"):
+    with pytest.raises(TypeError, match="loop returns none"):
         worker.address(worker.CHORDS[ONE_WAVE], types.float64(*worker.STEP.args))
 
 

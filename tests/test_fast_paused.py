@@ -117,7 +117,7 @@ def from_the_last_state(found, units):
     """Return particles that begin a flight where they were when the last cycle ended."""
     lanes, run = found.lanes.copy(), found.ensemble
     rows = [run.t, np.zeros(len(run.t)), run.x, run.y, run.vx, run.vy]
-    sizes = [*units.times(np.ones(2)), *units.places(np.ones((1, 4)))[0]]  # powers of 2
+    sizes = np.ldexp(1.0, units.of_step())  # powers of 2
     for k, (row, size) in enumerate(zip(rows, sizes, strict=True)):
         lanes[:, follow.FIRST_ROW + k] = row / size
     lanes[:, follow.FIRST_ROW + 6], lanes[:, follow.IS_KNOWN] = -1.0, 0.0  # on no wall, and no law is known

@@ -19,7 +19,7 @@ from support.truth import proved_step
 import fast
 from conformance.grading.agreement import compare
 from fast import step as stepper
-from fast.kernel.entries import pack_scene
+from fast.kernel.single import pack_scene
 from fast.units import Fitted, compile_scene, outward
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, Undecided, load
 from scene.refusal import BadInput
@@ -43,7 +43,7 @@ def test_the_search_sees_a_stepper_that_does_not_scale(monkeypatch, tally):
         return Fitted(scene, 0, 0, compiled, pack_scene(compiled, 0, 0))
 
     monkeypatch.setattr(stepper, "fit", unfitted)
-    monkeypatch.setattr(import_module("fast.flow"), "fit", unfitted)
+    monkeypatch.setattr(import_module("fast.flows"), "fit", unfitted)
     with np.errstate(all="ignore"):
         tally["wrong"] = len(search(4, 60, tally))
         assert tally["wrong"] > 5

@@ -10,8 +10,8 @@ A pair (high, low) stands for the sum high + low, |low| at most half a unit in t
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
-from math import factorial
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from mpmath import MPContext
 from numba import config, types
 from numba.extending import intrinsic
 
-from fast.kernel.compiling import kernel, packed, part
+from fast.kernel.compiling import kept, kernel, packed, part
 
 SAFETY = 8.0 * 2.0**-53  # eight units in the last place of the summed sizes of a sum's terms
 MAX_QUADRANT = 2.0**27
@@ -199,6 +199,17 @@ def sine_cosine(omega, omega_low, k, t_hi, t_lo):
 N_TERMS = 15  # of a series for an angle up to pi/4: to 2^-106
 
 
+QUARTER_TURN, QUARTER_TURN_LOW = math.pi / 2, 6.123233995736766e-17  # pi/2 as two floats
+
+
+@kept(error_model="numpy")
+def directions(turns, out):
+    """Fill out (n, 2) with cosine and sine of whole turns; no libm, hence the same everywhere."""
+    for i in range(turns.shape[0]):
+        s, _, c, _, _ = sine_cosine(4.0 * turns[i], 0.0, 1.0, QUARTER_TURN, QUARTER_TURN_LOW)
+        out[i, 0], out[i, 1] = c, s
+
+
 def _parts(number: Fraction, n: int) -> list[float]:
     """Split a number into n floats, each the nearest to what is left."""
     found = []
@@ -217,7 +228,7 @@ def half_pi() -> Fraction:
 
 HALF_PI = np.array(_parts(half_pi(), 4))
 # 1 / n! with the series' signs: of sin in odd rows, of cos in even ones.
-TERMS = np.array([_parts(Fraction((-1) ** (n // 2), factorial(n)), 2) for n in range(2 * N_TERMS)])
+TERMS = np.array([_parts(Fraction((-1) ** (n // 2), math.factorial(n)), 2) for n in range(2 * N_TERMS)])
 
 
 @kernel

@@ -9,11 +9,9 @@ need is called by its address.
 from __future__ import annotations
 
 import hashlib
-import os
 import shutil
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,7 +26,6 @@ from numba.core.codegen import get_host_cpu_features
 from numba.core.typing import Signature
 from numba.extending import intrinsic, register_jitable
 
-SEAL = hashlib.sha256().digest_size  # bytes, at the end of an index file
 # No fastmath, so that results are the same bits on every machine; quotients by zero are infinite or nan, as
 # in numpy. Who enters the kernel holds its arrays while it runs, hence no references are counted in it: each
 # count is an atomic operation, and much to compile. So a kernel cannot allocate.
@@ -64,10 +61,8 @@ def kept(*variant: object, **options: Any) -> Callable[[Any], Any]:
     decides what a function compiles to is in the name of its files, but for numba's switches for debugging:
     whatever lies under it is the right code. Files of other sources stay until somebody removes them.
 
-    numba also takes the files for what it wrote: one that is cut off ends the process, and one with another
-    bit is run. So an index ends in a digest of itself and of the code beside it, which numba does not read.
-    Where that does not fit, the files are removed, and the function is compiled again. So it is, but kept
-    nowhere, where no folder can be written in or the disk is full.
+    Files that cannot be read, as they are cut off or no pickles, are removed, and the function is compiled
+    again. Where no folder can be written in or the disk is full, it is compiled and kept nowhere.
 
     Args:
         variant: values that it closes over, which tell it from others of its name.
@@ -89,50 +84,14 @@ def kept(*variant: object, **options: Any) -> Callable[[Any], Any]:
 
 
 def _load_or_compile(entry: Any, compile_or_load: Callable[[Any], Any], signature: Any) -> Any:
-    """Let numba load an entry if its files are as they were written, else compile it, and seal the files."""
-    if signature in entry.overloads:
+    """Let numba load or compile an entry, once more without its files if it fails to read or write them."""
+    try:
         return compile_or_load(signature)
-    files = _files_of(entry)
-    if files and not _is_sealed(files):
-        for path in reversed(files):  # the index first: no code is found without it
+    except Exception:  # numba takes the files for what it wrote, and anything may be in them
+        name = entry.py_func.__qualname__.split(">.")[-1]  # of one in a function numba drops the brackets
+        for path in Path(entry.stats.cache_path).glob(f"*.{name}-*.nb[ic]"):
             shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
-    try:
-        found = compile_or_load(signature)
-    except OSError:  # it is compiled before it is written, and numba has it still
-        found = compile_or_load(signature)
-    if signature in entry.stats.cache_misses:
-        with suppress(OSError):
-            files = _files_of(entry)
-            for index in (path for path in files if path.suffix == ".nbi"):
-                content = index.read_bytes()
-                sealed = index.with_name(f".{index.name}.{os.getpid()}.part")
-                sealed.write_bytes(content + _seal(files, content))
-                sealed.replace(index)
-    return found
-
-
-def _files_of(entry: Any) -> list[Path]:
-    """Return the files that an entry is kept in, the index last."""
-    name = entry.py_func.__qualname__.split(">.")[-1]  # of one in a function numba drops the brackets
-    return sorted(Path(entry.stats.cache_path).glob(f"*.{name}-*.nb[ic]"))
-
-
-def _is_sealed(files: list[Path]) -> bool:
-    """Tell whether an index and the code beside it are as they were when the index was sealed."""
-    try:
-        found = files[-1].read_bytes()
-        return files[-1].suffix == ".nbi" and found[-SEAL:] == _seal(files, found[:-SEAL])
-    except OSError:
-        return False
-
-
-def _seal(files: list[Path], index: bytes) -> bytes:
-    """Return a digest of an index's content, of the code beside it, and of their names."""
-    digest = hashlib.sha256(index)
-    for path in files:
-        digest.update(path.name.encode())
-        digest.update(path.read_bytes() if path.suffix == ".nbc" else b"")
-    return digest.digest()
+        return compile_or_load(signature)
 
 
 def _called(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
@@ -157,8 +116,7 @@ def caller(signature: Signature) -> Callable[..., Any]:
 
         return signature.return_type(types.int64, types.Tuple(signature.args)), generate
 
-    called: Callable[..., Any] = call
-    return called
+    return call  # type: ignore[no-any-return]
 
 
 # A function of its own, compiled where compiled functions call it. Python, which calls the function as it is

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fast.kernel.arithmetic import add, div, fine_sine_cosine, mul, sub, times, two_sum
-from fast.kernel.compiling import kernel, part
+from fast.kernel.compiling import kept, kernel
 from fast.kernel.laws import set_anchors
 
 from fast.kernel.records import (  # isort: skip
@@ -254,7 +254,7 @@ def fine_step(wall, state, limit, scene, anchors):
     return code, time, FineState(t, x, y, vx, vy)
 
 
-@part
+@kept(error_model="numpy", nogil=True)
 def fine_path(scene, anchors, start, wall, limit, out, met, called_off):
     """Fill out[i] with dt, t, x, y, vx, vy as pairs and met[i] with the wall; returns number and last code.
 

@@ -23,13 +23,13 @@ import numpy as np
 
 from fast.kernel.arithmetic import fma
 from fast.kernel.bounces import captured, count_hit, spin_in_disk, stay_after
-from fast.kernel.compiling import kernel, part
+from fast.kernel.compiling import HOW, kept, kernel, part
 from fast.kernel.lane_laws import know_laws, set_piece, set_reference
 
 from fast.kernel.pools import (  # isort: skip
     AS_GIVEN, END, FAR, FATE, LANES, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, N_ROWS,
     ON_ARC, PIECE, R1, REF, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, TRIES, T_LOW, UNTIL, VX, VY,
-    W0_LOW, WALL, WHEN, X, Y, change_lane, load, refold, whole_registers,
+    W0_LOW, WALL, WHEN, X, Y, change_lane, load, particle_of, put_particle, refold, whole_registers,
 )  # fmt: skip
 from fast.kernel.records import (  # isort: skip
     ANEW, ARC, HORIZON, N_WALLS, RADIUS, TOO_FAR, VALUE, WIDTH, Particle, particle_at, write_state,
@@ -164,9 +164,8 @@ def set_stop(a, i, since, roster, worker):
 @kernel
 def careful_flight(a, i, worker):
     """Find a lane's next collision carefully; returns what `careful_step` does."""
-    t, t_low = a[T + i], a[T_LOW + i]
-    p = Particle(t, t_low, a[X + i], a[Y + i], a[VX + i], a[VY + i], int(a[WALL + i]))
-    limit = (worker.stops.times[-1] - t) - t_low
+    p = particle_of(a, i)
+    limit = (worker.stops.times[-1] - p.t) - p.t_low
     return run_careful(worker.loops.careful, (p, limit, KNOWN, worker.scene, worker.anchors))
 
 
@@ -186,7 +185,7 @@ def land_carefully(pool, a, i, code, s, p, worker):
     if pool == DISK:
         a[SPIN + i] = p.x * p.vy - p.y * p.vx
     count_hit(a, i, hit, 1.0)
-    a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i] = p.t, p.t_low, p.x, p.y, p.vx, p.vy
+    put_particle(a, i, p)
     a[WALL + i], a[S + i], a[TRIES + i] = hit, s, 0.0
     if worker.is_laned:
         know_laws(a, i, 0.0, scene, worker.pieces, worker.degree, worker.waves)
@@ -206,7 +205,8 @@ def step_carefully(pool, a, i, roster, worker):
         followed.careful[roster[PARTICLE, i]] += 1
         if code > HORIZON:
             return code
-        note_stops(a, i, roster, p.t, stops, followed)
+        # Rounded, the time at the horizon may be before it.
+        note_stops(a, i, roster, stops.times[-1] if code == HORIZON else p.t, stops, followed)
         if code == HORIZON or roster[NEXT_STOP, i] == stops.times.shape[0]:
             return np.int64(HORIZON)
         land_carefully(pool, a, i, code, s, p, worker)
@@ -355,9 +355,9 @@ def take_in(worker, j, wall):
     n_held[home] += 1
 
 
-@kernel
-def follow(worker, walls):
-    """Follow particles to the last stop.
+@kept(nogil=True, **HOW)
+def follow_particles(worker, walls):
+    """Follow particles to the last stop. Threads may call it side by side.
 
     Args:
         worker: it holds no particle yet; its `followed.states` are the particles' starts, or are not looked

@@ -22,7 +22,7 @@ from fast.kernel.arithmetic import (  # isort: skip
     PIO2_1, PIO2_2, PIO2_3, TWO_OVER_PI, add, beyond_first_order, fma, sine_cosine, sub, times, turned,
     two_product, two_sum,
 )  # fmt: skip
-from fast.kernel.compiling import kernel, packed, part
+from fast.kernel.compiling import kept, kernel, packed, part
 from fast.kernel.laws import bend_of_half_leg, set_anchors, whole_periods
 
 from fast.kernel.pools import (  # isort: skip
@@ -30,8 +30,8 @@ from fast.kernel.pools import (  # isort: skip
     PHASE_SINE, PIECE, R0, RADIUS_LAW, REF, REF_LOW, SLOPE_LAW, STRIDE, T, T_LOW, WIDTH_LAW,
 )  # fmt: skip
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, BANG_BANG, CONSTANT, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, KIND, N_HARMONICS, OMEGA,
-    PHASE, RADIUS, RATE, SINE, SINE_LOW, SLOPE, VALUE, VALUE_LOW, WIDTH, LaneWaves,
+    AMPLITUDES, ANCHORS_SHAPE, BANG_BANG, CONSTANT, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, KIND,
+    N_HARMONICS, OMEGA, PHASE, RADIUS, RATE, SINE, SINE_LOW, SLOPE, VALUE, VALUE_LOW, WIDTH, LaneWaves,
 )  # fmt: skip
 
 PARABOLA, SERIES = DEGREES = 2, 12  # with the latter a harmonic takes 27 pieces
@@ -136,9 +136,10 @@ def expand_waves(laws, anchors, row, out):
         out[j] = scale * (total[0] if (j - 1) % 4 < 2 else -total[0])
 
 
-@kernel
-def fill_coefficients(laws, references, coefficients, anchors):
+@kept(error_model="numpy")
+def fill_pieces(laws, references, coefficients):
     """Write the polynomials of all laws about reference times (P, 2): see `Pieces.coefficients`."""
+    anchors = np.zeros(ANCHORS_SHAPE)
     for i in range(references.shape[0]):
         set_anchors(laws, anchors, references[i, 0], references[i, 1])
         for row in (RADIUS, WIDTH, DEPTH, SLOPE):

@@ -16,20 +16,18 @@ from fast.kernel.aiming import (  # isort: skip
 )  # fmt: skip
 from fast.kernel.arithmetic import fma
 from fast.kernel.bounces import ONE
-from fast.kernel.compiling import packed, part
+from fast.kernel.compiling import HOW, kept, packed, part
 from fast.kernel.follow import careful_flight, knows_laws, land_carefully
-from fast.kernel.lane_laws import laws_in, look_ahead, set_reference
+from fast.kernel.lane_laws import ONE_WAVE, TWO_WAVES, laws_in, look_ahead, set_reference
 from fast.kernel.lanes import land
 
 from fast.kernel.pools import (  # isort: skip
     COARSE, END, FAR, FATE, HIT, MARKED, MAX_CORRECTIONS, MOVED, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT,
-    ON_RIGHT, R0, S, STOP, SURE, T, TRIES, T_LOW, VX, VY, WALL, X, Y, load,
+    ON_RIGHT, R0, S, STOP, SURE, T, TRIES, T_LOW, WALL, load, particle_of, put_particle,
 )  # fmt: skip
-from fast.kernel.records import (  # isort: skip
-    HORIZON, Particle, TableOfLanes, particle_at, write_state, write_step,
-)  # fmt: skip
+from fast.kernel.records import HORIZON, TableOfLanes, particle_at, write_state, write_step
 from fast.kernel.scalar_step import NEAR
-from fast.kernel.worker import GENERAL
+from fast.kernel.worker import FORMS, GENERAL
 
 FIRST = np.int64(0)  # the lane in use
 
@@ -129,24 +127,33 @@ def next_hit(a, worker, waves, slope, degree):
     if code < HORIZON:
         land_carefully(GENERAL, a, FIRST, code, s, p, worker)
     else:
-        a[T], a[T_LOW], a[X], a[Y], a[VX], a[VY] = p.t, p.t_low, p.x, p.y, p.vx, p.vy
+        put_particle(a, FIRST, p)
     return code
 
 
-@part
-def follow_one(worker, walls, paths, waves, slope, degree):
-    """Follow each particle of a worker by itself, through as many collisions as `paths` has room for."""
-    states, a = worker.followed.states, worker.pools[GENERAL]
-    for j in range(states.shape[0]):
-        load(a, FIRST, particle_at(states, j, walls[j]), False)
-        code, n = walls[j], 0
-        while n < paths.walls.shape[1] and worker.stops.called_off[0] == 0:
-            code = next_hit(a, worker, waves, slope, degree)
-            if code >= HORIZON:
-                break
-            paths.walls[j, n] = code
-            particle = Particle(a[T], a[T_LOW], a[X], a[Y], a[VX], a[VY], code)
-            write_step(paths, j, n, a[S], particle)
-            n += 1
-        paths.codes[j], paths.counts[j] = code, n
-        write_state(paths.ends, j, Particle(a[T], a[T_LOW], a[X], a[Y], a[VX], a[VY], int(a[WALL])))
+def _path(is_slope_moving, form):
+    degree, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
+
+    @kept(is_slope_moving, form, nogil=True, **HOW)
+    def follow_path(worker, walls, paths):
+        """Follow each particle of a worker by itself, through as many collisions as `paths` has room for."""
+        waves, slope = worker.waves if is_waves else None, None if is_slope_moving else worker.slope
+        states, a = worker.followed.states, worker.pools[GENERAL]
+        for j in range(states.shape[0]):
+            load(a, FIRST, particle_at(states, j, walls[j]), False)
+            code, n = walls[j], 0
+            while n < paths.walls.shape[1] and worker.stops.called_off[0] == 0:
+                code = next_hit(a, worker, waves, slope, degree)
+                if code >= HORIZON:
+                    break
+                paths.walls[j, n] = code
+                write_step(paths, j, n, a[S], particle_of(a, FIRST))
+                n += 1
+            paths.codes[j], paths.counts[j] = code, n
+            write_state(paths.ends, j, particle_of(a, FIRST))
+
+    return follow_path
+
+
+# By whether the slope moves, and by the form of the laws.
+PATHS = {(moves, form): _path(moves, form) for moves in (False, True) for form in FORMS}

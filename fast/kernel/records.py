@@ -25,7 +25,7 @@ APPROACHING, BEYOND, ANEW, OFF_WALL = np.array([40, 41, 50, 52])
 CAP, STEM, MUSHROOM = np.arange(3)
 
 
-FloatArray = npt.NDArray[np.floating[Any]]
+FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
@@ -187,7 +187,8 @@ class Paths(NamedTuple):
 
     Attributes:
         steps: (N, K, 6) dt, t, x, y, vx, vy after each collision, times `factors`.
-        factors: (2, 6) powers of two by which steps are multiplied, and their inverses.
+        factors: (4, 6) two powers of two by which steps are multiplied, and their inverses: one alone may
+            be none of the floats.
         n_exact: (N,) how many steps lost no bit by that, before the first that did.
         walls: (N, K) codes of the walls hit.
         counts: (N,) how many collisions there are.
@@ -204,12 +205,13 @@ class Paths(NamedTuple):
     ends: FloatArray
 
 
-def unfilled_paths(n_starts: int, n_collisions: int, factors: FloatArray | None = None) -> Paths:
-    """Return what is to be filled in for paths from some starts; steps times factors (6,), if any."""
-    by = np.ones(6) if factors is None else factors
+def unfilled_paths(n_starts: int, n_collisions: int, exponents: IntArray | None = None) -> Paths:
+    """Return what is to be filled in for paths from some starts; steps times 2^exponents (6,), if any."""
+    by = np.zeros(6, np.int64) if exponents is None else exponents
+    halves = np.stack([by // 2, by - by // 2])
     return Paths(
         np.empty((n_starts, n_collisions, 6)),
-        np.stack([by, 1.0 / by]),
+        np.ldexp(1.0, np.vstack([halves, -halves])),
         np.full(n_starts, n_collisions, np.int64),
         np.empty((n_starts, n_collisions), np.int64),
         np.zeros(n_starts, np.int64),
@@ -312,9 +314,9 @@ def write_step(paths, i, k, dt, particle):
     is_exact = True
     for column in range(6):
         number = numbers[column]
-        scaled = number * paths.factors[0, column]
+        scaled = number * paths.factors[0, column] * paths.factors[1, column]
         paths.steps[i, k, column] = scaled
-        is_exact = is_exact and scaled * paths.factors[1, column] == number
+        is_exact = is_exact and scaled * paths.factors[2, column] * paths.factors[3, column] == number
     if not is_exact:
         paths.n_exact[i] = min(paths.n_exact[i], k)
 

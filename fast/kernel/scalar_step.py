@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from fast.kernel.arithmetic import SAFETY, fma, two_product, two_sum
-from fast.kernel.compiling import kernel, part
+from fast.kernel.compiling import HOW, kept, kernel, part
 from fast.kernel.laws import phase_room, set_anchors
 
 from fast.kernel.records import (  # isort: skip
@@ -34,6 +34,7 @@ from fast.kernel.walls import (  # isort: skip
     crossed_wall, curvature_bounds, law_size, off_the_arc, reach_time, side_of_mouth, wall_function,
     wall_residual, wall_rest, wall_slope, width_rate,
 )  # fmt: skip
+
 from scene.states import ON_WALL
 
 MAX_PARABOLAS = 1_000_000
@@ -543,9 +544,9 @@ def wall_gap(particle, scene, anchors):
     return f, (h if particle.wall == FLOOR else max(w, abs(particle.x)))
 
 
-@kernel
-def judged_step(particle, limit, origin, scene, anchors):
-    """Take a careful step of a particle, known as well as `origin` says: see fast.kernel.careful.
+@kept(ON_WALL, **HOW)
+def scalar_step(particle, limit, origin, scene, anchors):
+    """Take a scalar step of a particle, known as well as `origin` says.
 
     For OFF_WALL the time of flight is the share of the wall's size by which the particle is off it.
     """

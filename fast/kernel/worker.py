@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import config, types
+from numba import config, typeof, types
 from numba.core.typing import Signature
 from numba.core.typing import signature as returns
 
@@ -28,8 +28,7 @@ from fast.kernel.records import (  # isort: skip
     ANCHORS_SHAPE, BEND, CAP, DEPTH, FASTEST, HIGHEST, LOWEST, MUSHROOM, RADIUS, SLOPE, STEM, WIDTH,
     Compiled, FloatArray, Followed, IntArray, LaneWaves, LawsInLanes, Particle, Pieces, Stops, TableOfLanes,
 )  # fmt: skip
-from fast.kernel.scalar_step import judged_step
-from scene.states import ON_WALL
+from fast.kernel.scalar_step import scalar_step
 
 LEAST_RADIUS = 2.0**-1000
 
@@ -79,20 +78,12 @@ def limits_of(scene: Compiled) -> LawLimits:
     return LawLimits(*map(float, found))
 
 
-_WHOLE, _REAL, _TRUTH = types.int64, types.float64, types.boolean
-_TABLE = types.float64[:, ::1]
-POOL = types.float64[::1]
-LIMITS = types.NamedUniTuple(_REAL, len(LawLimits._fields), LawLimits)
-SCENE = types.NamedTuple((_WHOLE, _TRUTH, _TABLE, _TABLE), Compiled)
-PARTICLE = types.NamedTuple((_REAL,) * 6 + (_WHOLE,), Particle)
-TABLE = types.NamedUniTuple(_TRUTH, len(TableOfLanes._fields), TableOfLanes)
-WAVES = types.NamedTuple(
-    (_REAL, _REAL, *(types.UniTuple(_REAL, len(law)) for law in NO_WAVES[2:])), LaneWaves
-)
-
-# Of both loops: the pool, how many lanes, and what the scene is.
-STEP = returns(types.none, POOL, _WHOLE, TABLE, WAVES, _REAL, LIMITS)
-CAREFUL = returns(types.Tuple((_WHOLE, _REAL, PARTICLE)), PARTICLE, _REAL, _WHOLE, SCENE, _TABLE)
+# What the loops and the scalar step take and return, by samples.
+_PARTICLE, _TABLE = Particle(*(0.0,) * 6, 0), np.zeros((1, 1))
+_LOOP_TAKES = (np.zeros(1), 0, TableOfLanes(*(False,) * 4), NO_WAVES, 0.0, LawLimits(*(0.0,) * 9))
+STEP = returns(types.none, *map(typeof, _LOOP_TAKES))
+_STEP_TAKES = (_PARTICLE, 0.0, 0, Compiled(0, False, _TABLE, _TABLE), _TABLE)
+CAREFUL = returns(typeof((0, 0.0, _PARTICLE)), *map(typeof, _STEP_TAKES))
 
 run_step, run_careful = caller(STEP), caller(CAREFUL)
 
@@ -111,38 +102,21 @@ class Loops(NamedTuple):
     chord: int
 
 
-@kept(ON_WALL, **HOW)
-def careful_step(particle, limit, origin, scene, anchors):
-    """Judge a particle as its origin asks, and take a careful step: see fast.kernel.scalar_step."""
-    return judged_step(particle, limit, origin, scene, anchors)
-
-
-def _fly(is_slope_moving, form):
+def _loop(step, is_slope_moving, form):
     terms, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
 
-    @kept(is_slope_moving, form, **HOW)
-    def fly_lanes(a, n, table, waves, slope, limits):
-        """See fast.kernel.lanes.fly."""
-        fly(a, n, table, waves if is_waves else None, None if is_slope_moving else slope, terms, limits)
+    @kept(step.__name__, is_slope_moving, form, **HOW)
+    def loop(a, n, table, waves, slope, limits):
+        """Take a step of each lane: see fast.kernel.lanes."""
+        step(a, n, table, waves if is_waves else None, None if is_slope_moving else slope, terms, limits)
 
-    return fly_lanes
-
-
-def _chord(form):
-    terms, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
-
-    @kept(form, **HOW)
-    def chord_lanes(a, n, table, waves, slope, limits):
-        """See fast.kernel.lanes.chord."""
-        chord(a, n, table, waves if is_waves else None, slope, terms, limits)
-
-    return chord_lanes
+    return loop
 
 
-# By the form of the laws, and whether the slope moves.
+# By the form of the laws, and whether the slope moves: a chord does not meet the sides.
 FORMS = (ONE_WAVE, TWO_WAVES, *DEGREES)
-FLIES = {(moves, form): _fly(moves, form) for moves in (False, True) for form in FORMS}
-CHORDS = {form: _chord(form) for form in FORMS}
+FLIES = {(moves, form): _loop(fly, moves, form) for moves in (False, True) for form in FORMS}
+CHORDS = {form: _loop(chord, False, form) for form in FORMS}
 
 
 def address(entry: Any, signature: Signature) -> Any:
@@ -163,18 +137,13 @@ def address(entry: Any, signature: Signature) -> Any:
 @cache
 def careful_at() -> Any:
     """Compile the careful step, or load it, and return its address."""
-    return address(careful_step, CAREFUL)
+    return address(scalar_step, CAREFUL)
 
 
 @cache
 def loops_for(is_slope_moving: bool, form: int) -> Loops:
     """Compile the loops for scenes of such a slope and laws of such a form, or load them."""
     return Loops(careful_at(), address(FLIES[is_slope_moving, form], STEP), address(CHORDS[form], STEP))
-
-
-def loops_of(in_lanes: LawsInLanes) -> Loops:
-    """Return the compiled loops that serve a scene."""
-    return loops_for(in_lanes.slope is None, in_lanes.degree)
 
 
 CACHE_LINE = 64  # bytes
@@ -190,7 +159,7 @@ class Worker(NamedTuple):
         scene, limits: the scene, and what holds of it for all time.
         table: of which kind it is, for the lanes.
         pieces, waves, degree: its laws as the lanes know them.
-        slope, is_slope_moving: of the sides, where it stands still; whether it moves.
+        slope: of the sides, where it stands still.
         loops: the compiled loops for laws of this degree and such a slope.
         anchors: room for its laws at one time.
         is_laned: the lanes may be used.
@@ -209,7 +178,6 @@ class Worker(NamedTuple):
     waves: LaneWaves
     degree: int
     slope: float
-    is_slope_moving: bool
     loops: Loops
     anchors: FloatArray
     is_laned: bool
@@ -227,12 +195,6 @@ def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
     return until > 0.0 and (abs(last) < until or last == np.inf)
 
 
-def table_of(scene: Compiled) -> TableOfLanes:
-    """Return what kind of table a scene is."""
-    kind = scene.table
-    return TableOfLanes(kind == int(STEM), kind == int(MUSHROOM), kind == int(CAP), bool(scene.is_relative))
-
-
 def new_pools() -> FloatArray:
     """Return (2, POOL_SIZE) empty pools that begin with a cache line, as then do all their rows.
 
@@ -248,16 +210,17 @@ def new_worker(
     in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed: int = 0, loops: Loops | None = None
 ) -> Worker:
     """Return a worker that holds no particle yet; with its scene's loops, or the given ones."""
+    scene = in_lanes.compiled
+    is_stem, is_mushroom, is_cap = (scene.table == int(kind) for kind in (STEM, MUSHROOM, CAP))
     return Worker(
-        in_lanes.compiled,
-        limits_of(in_lanes.compiled),
-        table_of(in_lanes.compiled),
+        scene,
+        limits_of(scene),
+        TableOfLanes(is_stem, is_mushroom, is_cap, bool(scene.is_relative)),
         in_lanes.pieces,
         in_lanes.waves,
         in_lanes.degree,
         0.0 if in_lanes.slope is None else in_lanes.slope,
-        in_lanes.slope is None,
-        loops or loops_of(in_lanes),
+        loops or loops_for(in_lanes.slope is None, in_lanes.degree),
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
         new_pools(),

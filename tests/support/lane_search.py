@@ -20,9 +20,9 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from fast.batch import LaneRound, as_particle, residual
-from fast.fine import fill_path
+from fast.batch import LaneRound, as_particle, followed_paths, residual
 from fast.kernel import lanes, pools, records
+from fast.kernel.fine_step import fine_path
 from fast.kernel.records import DEPTH, RATE, FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.laws import value
@@ -61,28 +61,23 @@ class Round(LaneRound):
         self.kernels = kernels
         self.is_cap, self.is_disk = self.is_disk, self.is_disk or is_captured
 
-    def step(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
-        """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
-        if not self.is_disk:
-            return self.fly(n)
-        # A step is judged from its state alone, not from the angular momentum of the stay so far.
-        x, y, vx, vy = (self.row(r, n) for r in (pools.X, pools.Y, pools.VX, pools.VY))
-        self.row(pools.SPIN, n)[:] = x * vy - y * vx
-        return self.skip(n)
-
-    def take(self, pool: np.integer[Any], n: int) -> None:
+    def advance(self, n: int) -> None:
         """Take a step in n lanes; faulty kernels run uncompiled, on a list."""
+        if self.is_disk:
+            # A step is judged from its state alone, not from the angular momentum of the interval so far.
+            x, y, vx, vy = (self.row(r, n) for r in (pools.X, pools.Y, pools.VX, pools.VY))
+            self.row(pools.SPIN, n)[:] = x * vy - y * vx
         if self.kernels is lanes:
-            super().take(pool, n)
+            super().advance(n)
             return
         a = self.pool.tolist()
         with np.errstate(all="ignore"):
-            self.advance(a, n)
+            self.call_loop(a, n)
             for i in range(n):
                 self.correct_lane(a, i)
         self.pool[:] = a
 
-    def advance(self, a: list[float], count: int) -> None:
+    def call_loop(self, a: list[float], count: int) -> None:
         """Call the loop of the kernels that `follow.advance` calls."""
         of, limits, k = self.in_lanes, self.worker.limits, self.kernels
         waves = of.waves if of.degree in (k.ONE_WAVE, k.TWO_WAVES) else None
@@ -98,8 +93,13 @@ class Round(LaneRound):
             if spare[pools.FATE] == pools.FAR:
                 t = spare[pools.T] + spare[pools.S]
                 k.set_reference(spare, 0, t, spare[pools.T_LOW], *known)
-            self.advance(spare, 1)
+            self.call_loop(spare, 1)
         k.copy_rows(spare, 0, a, i, 0, pools.POOL_SIZE)
+
+    def careful_step(self, p: FloatArray, wall: int) -> tuple[int, float, FloatArray]:
+        """Return the scalar step's wall, its time, and the state after, from a state and its wall."""
+        paths = followed_paths(self.compiled, p[None], np.array([wall]), 1, np.inf)
+        return int(paths.codes[0]), float(paths.steps[0, 0, 0]), paths.ends[0]
 
     def careful(self, p: FloatArray, wall: int) -> tuple[int, FloatArray]:
         """Return the careful step's wall and dt, x, y, vx, vy; unfolded, those of the next hit of the arc."""
@@ -143,7 +143,8 @@ class Round(LaneRound):
         steps, met = np.zeros((1, 6, 2)), np.zeros(1, dtype=np.int64)
         if is_folded:
             start[[2, 4]] *= -1.0
-        fill_path(self.compiled, start, wall, steps, met)
+        called_off = np.zeros(1, np.int64)
+        fine_path(self.compiled, self.anchors, start, wall, np.inf, steps, met, called_off)
         found = np.delete(steps[0, :, 0], 1)
         if is_folded:
             found[[2, 4]] *= -1.0

@@ -1,10 +1,8 @@
-"""The compiled functions that Python calls, kept in numba's disk cache.
+"""One question: a scalar step of one particle, from numbers to numbers.
 
-Files of other sources have other names, so that a change in any source compiles them anew: see
-fast.kernel.compiling. `single` is one scalar step of one particle, from numbers to numbers: most of what one
-question costs is around it. So units are changed here and not in Python, the scene is one array and the
-answer a tuple. Nothing is kept between calls, so that threads may ask side by side. What is refused here is
-refused by the checks in Python too, which say why.
+Most of what a question costs is around the step. So units are changed here and not in Python, the scene is
+one array and the answer a tuple. Nothing is kept between calls, so that threads may ask side by side. What is
+refused here is refused by the checks in Python too, which say why.
 """
 
 from __future__ import annotations
@@ -15,18 +13,10 @@ from functools import cache
 import numpy as np
 from numba import config, types
 
-from fast.kernel.arithmetic import sine_cosine
-from fast.kernel.compiling import HOW, kept, kernel, part
-from fast.kernel.fine_step import fine_path
-from fast.kernel.follow import follow
-from fast.kernel.lane_laws import ONE_WAVE, TWO_WAVES, fill_coefficients
-from fast.kernel.one_path import follow_one
-
-from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, HORIZON, OFF_WALL, SHARED, Compiled, Particle, particle_at, write_state, write_step,
-)  # fmt: skip
-from fast.kernel.scalar_step import GIVEN, KNOWN, MET
-from fast.kernel.worker import FORMS, run_careful
+from fast.kernel.compiling import kept, kernel, part
+from fast.kernel.records import ANCHORS_SHAPE, HORIZON, OFF_WALL, SHARED, Compiled, Particle
+from fast.kernel.scalar_step import GIVEN
+from fast.kernel.worker import run_careful
 
 # Beside those of fast.kernel.records: the question is no good, and the answer does not fit into binary64.
 REFUSED, ANSWER_LOST = np.array([53, 54])
@@ -120,8 +110,8 @@ def answer(length, time, code, dt, particle):
     return code, dt_out, t_out, x_out, y_out, vx_out, vy_out
 
 
-@part
-def single_step(step_at, numbers, t, x, y, vx, vy, wall, t_end):
+@kept(error_model="numpy")
+def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
     """Take a careful step, whose address is given, in a packed scene.
 
     Returns:
@@ -140,68 +130,6 @@ def single_step(step_at, numbers, t, x, y, vx, vy, wall, t_end):
     return answer(length, time, code, dt, particle)
 
 
-QUARTER_TURN, QUARTER_TURN_LOW = math.pi / 2, 6.123233995736766e-17  # pi/2 as two floats
-
-
-@kept(error_model="numpy")
-def careful(step_at, scene, anchors, states, walls, t_end, n_times, paths):
-    """Fill in the paths from each start by careful steps, n_times over: see fast.kernel.records.Paths."""
-    for i in range(n_times * states.shape[0]):
-        i %= states.shape[0]
-        particle, code, n = particle_at(states, i, walls[i]), walls[i], 0
-        while n < paths.walls.shape[1]:
-            limit = (t_end - particle.t) - particle.t_low
-            origin = KNOWN if n == 0 else MET
-            code, dt, particle = run_careful(step_at, (particle, limit, origin, scene, anchors))
-            if code >= HORIZON:
-                break
-            paths.walls[i, n] = code
-            write_step(paths, i, n, dt, particle)
-            n += 1
-        paths.codes[i], paths.counts[i] = code, n
-        write_state(paths.ends, i, particle)
-
-
-@kept(error_model="numpy", nogil=True)
-def fine(scene, anchors, start, wall, limit, out, met, called_off):
-    """Follow a path in pairs of floats: see fast.kernel.fine_step."""
-    return fine_path(scene, anchors, start, wall, limit, out, met, called_off)
-
-
-@kept(nogil=True, **HOW)
-def follow_particles(worker, walls):
-    """Follow particles to the last stop: see fast.kernel.follow. Threads may call it side by side."""
-    follow(worker, walls)
-
-
-def _path(is_slope_moving, form):
-    terms, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
-
-    @kept(is_slope_moving, form, nogil=True, **HOW)
-    def follow_path(worker, walls, paths):
-        """Follow particles one by one from collision to collision: see fast.kernel.one_path."""
-        waves, slope = worker.waves if is_waves else None, None if is_slope_moving else worker.slope
-        follow_one(worker, walls, paths, waves, slope, terms)
-
-    return follow_path
-
-
-# By whether the slope moves, and by the form of the laws.
-PATHS = {(moves, form): _path(moves, form) for moves in (False, True) for form in FORMS}
-
-
-@kept(error_model="numpy")
-def fill_pieces(laws, references, coefficients):
-    """Write the polynomials of all laws about reference times: see fast.kernel.lane_laws."""
-    fill_coefficients(laws, references, coefficients, np.zeros(ANCHORS_SHAPE))
-
-
-@kept(error_model="numpy")
-def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
-    """Take one step: see `single_step`."""
-    return single_step(step_at, numbers, t, x, y, vx, vy, wall, t_end)
-
-
 @kept(error_model="numpy")
 def off_wall(step_at, scene, particle):
     """Return the share of its wall's size by which a particle is off it; 0 for one on it.
@@ -210,14 +138,6 @@ def off_wall(step_at, scene, particle):
     """
     code, share, _ = run_careful(step_at, (particle, 0.0, GIVEN, scene, np.zeros(ANCHORS_SHAPE)))
     return share if code == OFF_WALL else 0.0
-
-
-@kept(error_model="numpy")
-def directions(turns, out):
-    """Fill out (n, 2) with cosine and sine of whole turns; no libm, hence the same everywhere."""
-    for i in range(turns.shape[0]):
-        s, _, c, _, _ = sine_cosine(4.0 * turns[i], 0.0, 1.0, QUARTER_TURN, QUARTER_TURN_LOW)
-        out[i, 0], out[i, 1] = c, s
 
 
 NUMBERS, REAL, WHOLE = types.float64[::1], types.float64, types.int64

@@ -11,13 +11,13 @@ import numpy as np
 
 from fast.ensemble import follow
 from fast.kernel import records
-from fast.kernel.entries import ANSWER_LOST
 from fast.kernel.records import FloatArray, Followed, IntArray, unfilled_ends
+from fast.kernel.single import ANSWER_LOST
 from fast.pieces import laws_in_lanes
 from fast.starts import least_collisions, only_stop
 from fast.step import as_arrays, fitted_start, next_collision, trouble
-from fast.units import fit
-from fast.validation import MOST_TO_A_TIME, given_states, given_threads
+from fast.units import fit, scaled
+from fast.validation import MOST_TO_A_TIME, check_states, check_threads
 from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State, Undecided, check_scene
 from scene.refusal import check_number
 
@@ -56,35 +56,33 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
     Source: captured means |sin phi| > nu at the arc, sec. 3.2.
     """
     check_scene(scene)
-    threads = given_threads(threads)
-    states = given_states(scene, states)
+    threads = check_threads(threads)
+    states = check_states(scene, states)
     t_end = check_number("t_end", t_end)
     refusals = [refuse(scene, state, t_end) for state in states]
     for i, refusal in enumerate(refusals):
         if isinstance(refusal, Rejected):
             raise InvalidState(f"particle {i}: {refusal.reason}")
-    return carry_judged(scene, states, refusals, t_end, threads)
+    return carry(scene, states, refusals, t_end, threads)
 
 
-def carry_judged(
+def carry(
     scene: Scene, states: Sequence[State], refusals: Sequence[Outcome | None], t_end: float, threads: int
 ) -> Flow:
     """Carry particles to t_end; those that `refuse` refuses stay where they are."""
     is_free = np.array([refusal is None for refusal in refusals], dtype=bool)
     starts = list(itertools.compress(states, is_free))
     done, _ = follow_to(scene, starts, t_end, threads)
+    ends = zip(done.codes.tolist(), done.states[:, 2:].tolist(), done.counts.sum(axis=1), strict=True)
     arrivals = iter(
         Horizon(t_end, *place) if code == records.HORIZON else trouble(code, scene, state, n)
-        for state, code, place, n in zip(
-            starts, done.codes.tolist(), done.states[:, 2:].tolist(), done.counts.sum(axis=1), strict=True
-        )
+        for state, (code, place, n) in zip(starts, ends, strict=True)
     )
-    n_states = len(states)
-    t_in, t_out = np.full(n_states, np.nan), np.full(n_states, np.nan)
-    counts, careful = np.zeros((n_states, 5), dtype=np.int64), np.zeros(n_states, dtype=np.int64)
-    t_in[is_free], t_out[is_free] = done.t_in[:, 0, 0], done.t_out[:, 0, 0]
-    counts[is_free], careful[is_free] = done.counts, done.careful
-    return Flow([refusal or next(arrivals) for refusal in refusals], t_in, t_out, counts, careful)
+    every = unfilled_ends(np.empty((len(states), 6)), 1, (1, 1))
+    for whole, own in zip(every, done, strict=True):
+        whole[is_free] = own
+    outcomes = [refusal or next(arrivals) for refusal in refusals]
+    return Flow(outcomes, every.t_in[:, 0, 0], every.t_out[:, 0, 0], every.counts, every.careful)
 
 
 def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int) -> tuple[Followed, float]:
@@ -104,14 +102,12 @@ def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int)
         stop = only_stop(units.horizon(t_end))
         done = unfilled_ends(rows[those], 1, (1, 1))
         seconds += follow(in_lanes, done, walls[those], stop, threads)
-        low_and_stay = np.column_stack([done.states[:, 1], done.t_in[:, 0, 0], done.t_out[:, 0, 0]])
-        is_lost = ~(units.keeps(np.delete(done.states, 1, axis=1)) & units.keeps_times(low_and_stay))
-        done.codes[is_lost], done.states[is_lost] = ANSWER_LOST, 0.0
-        done.t_in[is_lost], done.t_out[is_lost] = np.nan, np.nan
-        times, places = units.times(done.states[:, :2]), units.places(done.states[:, 2:])
-        done = done._replace(
-            states=np.hstack([times, places]), t_in=units.times(done.t_in), t_out=units.times(done.t_out)
-        )
+        # t, its low part, x, y, vx, vy; begin and end of the capture interval
+        numbers = np.column_stack([done.states, done.t_in[:, 0, 0], done.t_out[:, 0, 0]])
+        numbers, is_kept = scaled(numbers, np.append(units.of_step(), [units.time, units.time]))
+        is_lost = ~is_kept.all(axis=1)
+        done.codes[is_lost], numbers[is_lost] = ANSWER_LOST, np.nan
+        done.states[:], done.t_in[:, 0, 0], done.t_out[:, 0, 0] = numbers[:, :6], numbers[:, 6], numbers[:, 7]
         for whole, own in zip(followed, done, strict=True):
             whole[those] = own
     return followed, seconds

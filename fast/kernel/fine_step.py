@@ -14,11 +14,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from fast.kernel.arithmetic import add, div, fine_sine_cosine, mul, sub, times, two_sum
 from fast.kernel.compiling import kept, kernel
-from fast.kernel.laws import set_anchors
+from fast.kernel.laws import leg_at, set_anchors, time_since
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, ARC, BANG_BANG, BASE, BEYOND, DEPTH, FAR_TIME, FLOOR, FOURIER, HORIZON, KIND, KNOTS, LEVEL,
@@ -59,24 +57,13 @@ def phase(laws, row, k, t):
 @kernel
 def half_leg_at(laws, row, t):
     """Return where in a bang-bang law a time lies: half-leg, periods gone by, time from the nearer knot."""
-    n = int(laws[row, N_KNOTS])
-    first, period = laws[row, KNOTS], (laws[row, PERIOD], laws[row, PERIOD_LOW])
-    since = sub(t, (first, 0.0))
-    n_periods = np.floor(since[0] / period[0])
-    tau = sub(since, times(n_periods, period))
-    if tau[0] < 0.0:
-        n_periods -= 1.0
-    elif sub(tau, period)[0] >= 0.0:
-        n_periods += 1.0
-    tau = sub(since, times(n_periods, period))
-    i = 0
-    while i < n - 2 and sub(tau, two_sum(laws[row, KNOTS + i + 1], -first))[0] >= 0.0:
-        i += 1
-    u = sub(tau, two_sum(laws[row, KNOTS + i], -first))
-    length = two_sum(laws[row, KNOTS + i + 1], -laws[row, KNOTS + i])
-    if sub(u, times(0.5, length))[0] < 0.0:
+    i, n_periods = leg_at(laws, row, t[0], t[1])
+    before, after = laws[row, KNOTS + i], laws[row, KNOTS + i + 1]
+    period, period_low = laws[row, PERIOD], laws[row, PERIOD_LOW]
+    u = time_since(before, n_periods, period, period_low, t[0], t[1])
+    if sub(u, times(0.5, two_sum(after, -before)))[0] < 0.0:
         return 2 * i, n_periods, u
-    return 2 * i + 1, n_periods, sub(u, length)
+    return 2 * i + 1, n_periods, time_since(after, n_periods, period, period_low, t[0], t[1])
 
 
 @kernel

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
+from support.lane_search import draw_scene
 
 import fast
 from fast import ensemble, pieces
@@ -15,6 +18,7 @@ from fast.starts import one_cycle
 from fast.units import Units, fit
 from scene import BadInput, BangBang, Cap, Fourier, Mushroom, load
 
+N_DRAWN = int(os.environ.get("MUSHROOMS_GOES", "3"))
 TWICE = tuple(zip(map(float, range(9)), (1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0), strict=True))
 BREATH = ((0.0, 1.0), (2.0, 1.0), (2.5, 1.25), (6.0, 1.25), (6.5, 1.0), (8.0, 1.0))
 WAVE = Fourier(mean=1.0, omega=1.0, sin=(0.3,))
@@ -70,6 +74,29 @@ def test_cycles_in_goes_are_those_at_once(name):
         assert is_same(found, fast.go_on(scene, n_cycles=cuts[-1], threads=2, **asked))
         assert found.ensemble.sha256() == fast.simulate(scene, n_cycles=cuts[-1], **asked).sha256()
         assert found.ensemble.ns_per_collision() > 0.0
+
+
+def test_slow_particles_of_drawn_scenes_go_on_alike(tally):
+    """A flight lasts for several stops, and for several pieces of the laws; many steps are scalar ones."""
+    random = np.random.default_rng(11)
+    while tally["runs"] < N_DRAWN:
+        scene = draw_scene(random)
+        phases = sorted(random.uniform(0.01, 0.99, int(random.integers(0, 8))).tolist())
+        energy = float(10.0 ** random.uniform(-1, 2)) / one_cycle(scene) ** 2
+        cuts, asked = cuts_of(random, 5), {"n_particles": 30, "energy": energy, "phases": phases}
+        whole = fast.go_on(scene, n_cycles=cuts[-1], **asked)
+        assert is_same(in_goes(scene, cuts, **asked), whole), (scene, cuts, asked)
+        assert np.isfinite(whole.ensemble.cycle_energies[whole.ensemble.outcome == 0]).all()
+        tally["runs"] += 1
+
+
+def test_the_last_energy_is_known_however_the_horizon_is_rounded():
+    """The last flight takes a cycle: its begin plus its length, rounded, may be just before the end."""
+    h = ((0.0, 1.83), (0.24, 1.83), (0.63, 2.71), (0.77, 2.15), (1.0, 1.83))
+    scene = Mushroom(r=1.0, h=BangBang(knots=h), nu=0.2)
+    for n_cycles in (1, 2, 3):
+        run = fast.simulate(scene, n_particles=200, energy=0.3, n_cycles=n_cycles, seed=1)
+        assert np.isfinite(run.energy[run.outcome == 0]).all()
 
 
 def test_cycles_in_goes_without_lanes(monkeypatch):

@@ -88,7 +88,6 @@ DAMAGES = {
     "cut late": cut(0.999),
     "noise": lambda path: path.write_bytes(os.urandom(5000)),
     "another object": lambda path: path.write_bytes(pickle.dumps({"an": "object"})),
-    "a folder": replaced(lambda path: (path / "in").mkdir(parents=True)),
     "not to be read": replaced(lambda path: path.symlink_to(path)),
     "missing": replaced(lambda _: None),
 }

@@ -9,7 +9,6 @@ need is called by its address.
 from __future__ import annotations
 
 import hashlib
-import shutil
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -84,14 +83,15 @@ def kept(*variant: object, **options: Any) -> Callable[[Any], Any]:
 
 
 def _load_or_compile(entry: Any, compile_or_load: Callable[[Any], Any], signature: Any) -> Any:
-    """Let numba load or compile an entry, once more without its files if it fails to read or write them."""
-    try:
-        return compile_or_load(signature)
-    except Exception:  # numba takes the files for what it wrote, and anything may be in them
-        name = entry.py_func.__qualname__.split(">.")[-1]  # of one in a function numba drops the brackets
-        for path in Path(entry.stats.cache_path).glob(f"*.{name}-*.nb[ic]"):
-            shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
-        return compile_or_load(signature)
+    """Let numba load or compile an entry, again without its files if it fails to read or write them."""
+    for _ in range(2):  # it may fail to read, and then to write
+        try:
+            return compile_or_load(signature)
+        except Exception:  # numba takes the files for what it wrote, and anything may be in them
+            name = entry.py_func.__qualname__.split(">.")[-1]  # of one in a function numba drops the brackets
+            for path in Path(entry.stats.cache_path).glob(f"*.{name}-*.nb[ic]"):
+                path.unlink(missing_ok=True)
+    return compile_or_load(signature)
 
 
 def _called(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:

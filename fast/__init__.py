@@ -5,19 +5,14 @@ The functions are imported on first use, because importing numba takes half a se
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fast.ensemble import Ensemble, simulate
-    from fast.fine import FineTrajectory, fine_trajectory
-    from fast.flow import Flow, flow
-    from fast.paused import Paused, go_on
+    from fast.ensemble import Ensemble, Paused, go_on, simulate
+    from fast.flows import Flow, flow
+    from fast.paths import Collisions, FineTrajectory, Reached, fine_trajectory, follow, trajectory
     from fast.step import next_collision
-    from fast.trajectory import Collisions, trajectory
-    from fast.until import Reached, follow
 
 __all__ = [
     "Collisions",
@@ -35,41 +30,20 @@ __all__ = [
     "trajectory",
 ]
 
-_PLACES = {
-    "ensemble": ("Ensemble", "simulate"),
-    "fine": ("FineTrajectory", "fine_trajectory"),
-    "flow": ("Flow", "flow"),
-    "paused": ("Paused", "go_on"),
+_MODULES = {
+    "ensemble": ("Ensemble", "Paused", "go_on", "simulate"),
+    "flows": ("Flow", "flow"),
+    "paths": ("Collisions", "FineTrajectory", "Reached", "fine_trajectory", "follow", "trajectory"),
     "step": ("next_collision",),
-    "trajectory": ("Collisions", "trajectory"),
-    "until": ("Reached", "follow"),
 }
-_found: dict[str, Any] = {}
 
 
-def _late(place: str, name: str) -> property:
-    def get(_: ModuleType) -> Any:
-        if name not in _found:
-            _found[name] = getattr(import_module(f"fast.{place}"), name)
-        return _found[name]
-
-    def put(_: ModuleType, value: Any) -> None:
-        # Python puts a module that it imports beside its siblings; here a function has that name.
-        if not isinstance(value, ModuleType):
-            _found[name] = value
-
-    return property(get, put)
+def __getattr__(name: str) -> Any:
+    for module, names in _MODULES.items():
+        if name in names:
+            return getattr(import_module(f"fast.{module}"), name)
+    raise AttributeError(f"module 'fast' has no attribute {name!r}")
 
 
-class _Face(ModuleType):
-    """A module whose names stand before its submodules', two of which are called as their functions are."""
-
-    def __dir__(self) -> list[str]:
-        """List the public names, none of which has been imported yet."""
-        return __all__
-
-
-for _place, _names in _PLACES.items():
-    for _name in _names:
-        setattr(_Face, _name, _late(_place, _name))
-sys.modules[__name__].__class__ = _Face
+def __dir__() -> list[str]:
+    return __all__

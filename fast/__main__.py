@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import msgspec
 
 import fast
-from fast.flow import carry_judged, refuse
-from fast.given import given_threads
+from fast import flows
+from fast.validation import check_threads
 from scene import Collision, Horizon, Outcome, Scene, State
 from scene.protocol.wire import serve
 
@@ -27,8 +27,8 @@ def carry(
     scene: Scene, states: Sequence[State], t_end: float
 ) -> list[tuple[Outcome, tuple[float, float] | None]]:
     """Return each particle's outcome at t_end and its first capture interval; refuse only bad starts."""
-    refusals = [refuse(scene, state, t_end) for state in states]
-    run = carry_judged(scene, states, refusals, t_end, given_threads(None))
+    refusals = [flows.refuse(scene, state, t_end) for state in states]
+    run = flows.carry(scene, states, refusals, t_end, check_threads(None))
     return [
         # Only a particle that arrives has a capture interval.
         (outcome, (begin, end) if isinstance(outcome, Horizon) and not math.isnan(begin) else None)

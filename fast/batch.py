@@ -1,6 +1,6 @@
-"""One step of each of many given states: careful, fine, or by one round of the lanes.
+"""One step of each of many given states: scalar, fine, or by one round of the lanes.
 
-Ensembles and flows mix careful step and lanes; here each is alone, so that its answers can be compared and
+Ensembles and flows mix scalar step and lanes; here each is alone, so that its answers can be compared and
 its time measured.
 """
 
@@ -13,23 +13,27 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast.compiled import compile_scene
-from fast.fine import FineTrajectory, as_pairs, as_trajectory, fill_path
-from fast.flow import follow_to
-from fast.kernel import codes, pools
+from fast.flows import follow_to
+from fast.kernel import pools, records
 from fast.kernel.compiling import kept
 from fast.kernel.follow import advance
 from fast.kernel.lane_laws import know_laws, set_reference
 from fast.kernel.laws import set_anchors
 from fast.kernel.pools import COARSE, FAR, MARKED, MAX_CORRECTIONS, MOVED, copy_rows, load, whole_registers
-from fast.kernel.records import ANCHORS_SHAPE, FloatArray, Particle, unfilled_ends
+
+from fast.kernel.records import (  # isort: skip
+    ANCHORS_SHAPE, HORIZON, Compiled, FloatArray, IntArray, Particle, Paths, particle_at, unfilled_ends,
+    unfilled_paths, write_state, write_step,
+)  # fmt: skip
+from fast.kernel.scalar_step import KNOWN, MET
 from fast.kernel.walls import wall_residual
-from fast.kernel.worker import DISK, GENERAL, new_worker
+from fast.kernel.worker import DISK, GENERAL, careful_at, new_worker, run_careful
+from fast.paths import FineTrajectory, as_trajectory, end_of_path, fill_fine_path
 from fast.pieces import laws_in_lanes
 from fast.starts import only_stop
-from fast.step import WALL_NAMES, as_arrays, fitted_start, followed_paths, trouble
-from fast.units import fit
-from scene import Collision, Horizon, Outcome, Scene, State
+from fast.step import WALL_NAMES, as_arrays, fitted_start
+from fast.units import compile_scene, fit, outward
+from scene import Collision, Outcome, Scene, State
 
 PLACE = (pools.X, pools.Y, pools.VX, pools.VY)
 
@@ -71,8 +75,45 @@ def residual(particle, scene, anchors):
     return wall_residual(particle.wall, particle.x, particle.y, scene, anchors)
 
 
+@kept(error_model="numpy")
+def fill_careful(step_at, scene, anchors, states, walls, t_end, n_times, paths):
+    """Fill in the paths from each start by careful steps, n_times over: see `Paths`."""
+    for i in range(n_times * states.shape[0]):
+        i %= states.shape[0]
+        particle, code, n = particle_at(states, i, walls[i]), walls[i], 0
+        while n < paths.walls.shape[1]:
+            limit = (t_end - particle.t) - particle.t_low
+            origin = KNOWN if n == 0 else MET
+            code, dt, particle = run_careful(step_at, (particle, limit, origin, scene, anchors))
+            if code >= HORIZON:
+                break
+            paths.walls[i, n] = code
+            write_step(paths, i, n, dt, particle)
+            n += 1
+        paths.codes[i], paths.counts[i] = code, n
+        write_state(paths.ends, i, particle)
+
+
+def followed_paths(
+    compiled: Compiled, states: FloatArray, walls: IntArray, n_collisions: int, t_end: float, n_times: int = 1
+) -> Paths:
+    """Follow each of N states by careful steps, all in the kernel's units.
+
+    Args:
+        compiled: the scene's numbers.
+        states: (N, 6) t, its low part, x, y, vx, vy.
+        walls: (N,) codes of the walls that they leave.
+        n_collisions: how many collisions to follow.
+        t_end: horizon [time]; infinity for none.
+        n_times: how often to do all this, where its time is measured.
+    """
+    paths = unfilled_paths(len(states), n_collisions)
+    fill_careful(careful_at(), compiled, np.zeros(ANCHORS_SHAPE), states, walls, t_end, n_times, paths)
+    return paths
+
+
 def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple[list[Outcome], float]:
-    """Take a careful step from each of N states, in compiled code throughout.
+    """Take a scalar step from each of N states, in compiled code throughout.
 
     Args:
         scene: table and laws of motion.
@@ -92,32 +133,25 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
     outcomes: list[Outcome] = []
     for state, start, code, row in zip(states, starts, paths.codes.tolist(), paths.steps[:, 0], strict=True):
         if code in WALL_NAMES:
-            outcomes.append(Collision(WALL_NAMES[code], *start.units.steps(row).tolist()))
-        elif code == codes.HORIZON:  # it moves for ever
-            outcomes.append(Horizon(np.inf, state.x, state.y, state.vx, state.vy))
-        else:
-            outcomes.append(trouble(code, scene, state))
+            outcomes.append(Collision(WALL_NAMES[code], *outward(row, start.units.of_step()).tolist()))
+        else:  # without a horizon only what never moves meets no wall
+            place = np.array([state.x, state.y, state.vx, state.vy])
+            outcomes.append(end_of_path(code, scene, state, 0, np.inf, place))
     return outcomes, seconds
 
 
 def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple[list[FineTrajectory], float]:
     """Take a fine step from each of N states, a call of compiled code for each; as `careful_steps`."""
     starts = [fitted_start(scene, state) for state in states]
-    compiled, pairs = fit(scene).compiled, [as_pairs(start) for start in starts]
-    _, walls = as_arrays(starts)
-    out, met = np.empty((len(states), 1, 6, 2)), np.empty((len(states), 1), dtype=np.int64)
-    questions = list(zip(pairs, walls.tolist(), out, met, strict=True))
-    ends: list[tuple[int, int]] = []
-    if states:
-        fill_path(compiled, *questions[0])  # compiles, or loads
+    steps, met = np.empty((len(states), 1, 6, 2)), np.empty((len(states), 1), dtype=np.int64)
+    questions = list(zip(starts, steps, met, strict=True))
+    ends = [fill_fine_path(*question) for question in questions[:1]]  # compiles, or loads
     begin = time.perf_counter()
     for _ in range(n_times):
-        ends = [fill_path(compiled, *question) for question in questions]
+        ends = [fill_fine_path(*question) for question in questions]
     seconds = time.perf_counter() - begin
-    paths = zip(states, starts, ends, out, met, strict=True)
-    return [
-        as_trajectory(scene, s, start.units, *end, steps, hit) for s, start, end, steps, hit in paths
-    ], seconds
+    paths = zip(states, starts, ends, steps, met, strict=True)
+    return [as_trajectory(scene, *path) for path in paths], seconds
 
 
 def flights(scene: Scene, states: Sequence[State], t_end: float) -> tuple[int, float]:
@@ -137,13 +171,13 @@ class LaneRound:
 
     Attributes:
         compiled: the scene's numbers.
-        is_disk: whether the scene is a cap, whose particles move unfolded: only the arc is met.
+        is_disk: whether particles move unfolded through the base: only the arc is met. So they do in a cap.
         serves: the longest time that a piece of its laws serves.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.compiled = compile_scene(scene)
-        self.is_disk = bool(self.compiled.table == codes.CAP)
+        self.is_disk = bool(self.compiled.table == records.CAP)
         self.in_lanes = laws_in_lanes(scene)
         self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6)), 1, (1, 1)))
         self.serves = float(np.diff(self.in_lanes.pieces.begins, append=self.in_lanes.pieces.period).max())
@@ -156,39 +190,21 @@ class LaneRound:
 
     def is_met(self, p: FloatArray, wall: int) -> bool:
         """Tell whether a state lies, but for rounding, on the wall that it leaves, as after a step."""
-        particle = as_particle(p, wall)
-        if wall == codes.NO_WALL:
-            return False
-        if wall == codes.BASE:
-            return bool(particle.y == 0.0)
-        f, error = residual(particle, self.compiled, self.anchors)
+        if wall in (records.NO_WALL, records.BASE):
+            return bool(wall == records.BASE and p[3] == 0.0)
+        f, error = residual(as_particle(p, wall), self.compiled, self.anchors)
         return bool(abs(f) <= error)
 
-    def fly(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
+    def step(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
-        self.take(GENERAL, n)
-        return self.answers(n)
-
-    def skip(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
-        """Take captured chords in n lanes, likewise; every hit is on the arc."""
-        self.take(DISK, n)
-        right, _, rows = self.answers(n)
-        return right, np.zeros(n), rows
-
-    def take(self, pool: np.integer[Any], n: int) -> None:
-        """Take a step in n lanes."""
-        step_lanes(pool, self.pool, np.int64(n), self.worker, self.spare)
-
-    def answers(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
-        """Return which of n lanes have moved, the walls that they met, and rows of dt, x, y, vx, vy."""
+        self.advance(n)
         rows = np.column_stack([self.row(r, n) for r in (pools.S, *PLACE)])
         fates = self.row(pools.FATE, n)
         return (fates == MARKED) | (fates == MOVED), self.row(pools.HIT, n).copy(), rows
 
-    def careful_step(self, p: FloatArray, wall: int) -> tuple[int, float, FloatArray]:
-        """Return the careful step's wall, its time, and the state after, from a state and its wall."""
-        paths = followed_paths(self.compiled, p[None], np.array([wall]), 1, np.inf)
-        return int(paths.codes[0]), float(paths.steps[0, 0, 0]), paths.ends[0]
+    def advance(self, n: int) -> None:
+        """Take a step in n lanes."""
+        step_lanes(DISK if self.is_disk else GENERAL, self.pool, np.int64(n), self.worker, self.spare)
 
     def row(self, start: np.integer[Any], n: int) -> FloatArray:
         """Return n lanes of a row of the pool."""
@@ -203,9 +219,9 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
         states: starts that `next_collision` takes.
 
     Returns:
-        Collisions; None where the lanes leave the step to the careful one, for a start on the base of a cap
+        Collisions; None where the lanes leave the step to the scalar one, for a start on the base of a cap
         or a flight to it (there the lanes go unfolded), and for a start that is on no wall, or on its wall
-        by decree only: lanes know a particle by the wall that it has just met, and where that wall is.
+        by definition only: lanes know a particle by the wall that it has just met, and where that wall is.
     """
     pool = LaneRound(fit(scene).scene)
     found: list[Outcome | None] = []
@@ -215,12 +231,13 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
         for i, (p, wall) in enumerate(zip(*as_arrays(starts), strict=True)):
             pool.fill(i, p, wall)
             are_met.append(pool.is_met(p, wall))
-        rows = (pool.skip if pool.is_disk else pool.fly)(len(part))
-        for state, start, is_met, is_right, hit, row in zip(part, starts, are_met, *rows, strict=True):
+        for state, start, is_met, is_right, hit, row in zip(
+            part, starts, are_met, *pool.step(len(part)), strict=True
+        ):
             is_folded = pool.is_disk and (row[2] < 0.0 or state.wall == "base")
             if not is_right or is_folded or not is_met:
                 found.append(None)
                 continue
-            numbers = start.units.steps(np.array([row[0], start.state.t + row[0], *row[1:]]))
+            numbers = outward(np.array([row[0], start.state.t + row[0], *row[1:]]), start.units.of_step())
             found.append(Collision(WALL_NAMES[int(hit)], *numbers.tolist()))
     return found

@@ -2,6 +2,7 @@
 
 The results of a particle depend on that particle alone. They have the same bits for any number
 of particles, threads or chunks.
+An ensemble can be continued: some cycles now and more later, with the bits of a single run.
 """
 
 from __future__ import annotations
@@ -15,36 +16,25 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast.compiled import LARGEST
-from fast.given import (
-    MAX_CYCLES,
-    MAX_FIRST,
-    MAX_PARTICLES,
-    MOST_IN_CYCLES,
-    check_kept,
-    given_energy,
-    given_phases,
-    given_progress,
-    given_threads,
-)
-from fast.kernel import codes, entries
-from fast.kernel.records import (
-    FloatArray,
-    Followed,
-    IntArray,
-    LawsInLanes,
-    Stops,
-    unfilled_ends,
-)
-from fast.kernel.worker import new_worker
+from fast.kernel import records
+from fast.kernel.follow import LANE_ROWS, follow_particles
+from fast.kernel.records import FloatArray, Followed, IntArray, LawsInLanes, Stops, unfilled_ends
+from fast.kernel.single import LARGEST
+from fast.kernel.worker import is_known_throughout, new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import cycle_stops, initial_states, least_collisions, one_cycle
 from fast.threads import awaited, interruptible
-from fast.units import Units, fit, inward
+from fast.units import Units, fit, inward, outward
+
+from fast.validation import (  # isort: skip
+    MAX_CYCLES, MAX_FIRST, MAX_PARTICLES, MOST_IN_CYCLES, check_kept, check_energy, check_phases,
+    check_progress, check_threads,
+)  # fmt: skip
 from scene import Scene, check_scene
 from scene.mouth import narrowings
 from scene.notebook import rows
-from scene.refusal import BadInput, check_count
+from scene.refusal import BadInput, check_count, shown
+from scene.tables import laws
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
 SHARE = 256  # particles a worker takes at a time, for each cycle: several times what it holds at once
@@ -266,14 +256,17 @@ class Plan(NamedTuple):
         done = unfilled_ends(states, n_columns, self.stops.narrowings.shape, n_lane_rows)
         if lanes is not None:
             done.lanes[:] = lanes
-        free, in_lanes = np.full(len(states), codes.NO_WALL), laws_in_lanes(self.scene)
+        free, in_lanes = np.full(len(states), records.NO_WALL), laws_in_lanes(self.scene)
         return done, follow(in_lanes, done, free, self.stops, self.threads, self.progress, n_passed)
 
     def ensemble(self, done: Followed, seconds: float) -> Ensemble:
         """Name what the kernel filled in for some particles."""
         units, every = self.units, (-1, *self.size[1:])
-        energies, captured = units.energies(done.energies).reshape(every), done.is_captured.reshape(every)
-        columns = [units.times(done.states[:, 0]), *units.places(done.states[:, 2:]).T]
+        energies, captured = (
+            outward(done.energies, units.of_energy()).reshape(every),
+            done.is_captured.reshape(every),
+        )
+        columns = outward(np.delete(done.states, 1, axis=1), units.of_step()[1:]).T
         t, x, y, vx, vy = (np.ascontiguousarray(column) for column in columns)
         return Ensemble(
             energy0=self.energy0,
@@ -286,8 +279,8 @@ class Plan(NamedTuple):
             vy=vy,
             n_collisions=done.counts.sum(axis=1),
             outcome=outcomes(done.codes),
-            t_in=units.times(done.t_in),
-            t_out=units.times(done.t_out),
+            t_in=outward(done.t_in, units.time),
+            t_out=outward(done.t_out, units.time),
             wall_counts=done.counts,
             phase_energies=energies[:, :, :-1],
             phase_captured=captured[:, :, :-1],
@@ -318,12 +311,12 @@ def planned(
     n_cycles = check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
     seed = check_count("seed", seed, 0, 2**64 - 1)
     first = check_count("first", first, 0, MAX_FIRST)
-    energy, phases = given_energy(energy), given_phases(phases)
-    threads, progress = given_threads(threads), given_progress(progress)
+    energy, phases = check_energy(energy), check_phases(phases)
+    threads, progress = check_threads(threads), check_progress(progress)
     fitted = fit(scene)
     # A static table is followed for units of the caller's time.
     units = Units(fitted.length, fitted.time or 0)
-    scene, speed2 = fitted.scene, 2.0 * inward("energy", energy, 2 * (units.length - units.time))
+    scene, speed2 = fitted.scene, 2.0 * inward("energy", energy, units.of_energy())
     check_kept(n_particles, n_cycles, len(phases), len(narrowings(scene)))
     ahead = least_collisions(scene, math.sqrt(speed2), n_cycles * one_cycle(scene))
     if ahead > MOST_IN_CYCLES:
@@ -350,7 +343,7 @@ def _share(n: int, threads: int, n_cycles: int) -> int:
 
 def outcomes(ends: IntArray) -> npt.NDArray[np.int8]:
     """Return 0, 1, 2, 3 for particles followed to the end, undecided, undefined, rejected."""
-    kinds = [ends == codes.HORIZON, ends < codes.FAR_TIME, ends < codes.APPROACHING]
+    kinds = [ends == records.HORIZON, ends < records.FAR_TIME, ends < records.APPROACHING]
     return np.select(kinds, [FOLLOWED, UNDEFINED, UNDECIDED], REJECTED).astype(np.int8)
 
 
@@ -383,7 +376,7 @@ def follow(
     def work(first: int) -> None:
         part = slice(first, first + size)
         worker = new_worker(in_lanes, stops, followed.part(part), n_passed)
-        entries.follow_particles(worker, walls[part])
+        follow_particles(worker, walls[part])
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
     if progress:
@@ -396,3 +389,112 @@ def follow(
             if progress:
                 progress(min(first + size, n))
     return time.perf_counter() - begin
+
+
+BY_CYCLE = ("cycle_energies", "t_in", "t_out", "phase_energies", "phase_captured")
+
+
+class Paused(NamedTuple):
+    """An ensemble, and the data needed to continue it.
+
+    A last state is not enough. It lies in the middle of a flight, and a flight restarted there rounds
+    differently.
+
+    Attributes:
+        ensemble: results up to the end of its last cycle.
+        lanes: (N, LANE_ROWS) each particle at its last collision, and its next one, in the stepper's own
+            units (`fast.kernel.follow`); nan for one that was not followed to the end.
+        asked: table, laws, seed, first and phases of the run, by name; None if a caller has rebuilt the
+            object and guarantees them.
+    """
+
+    ensemble: Ensemble
+    lanes: FloatArray
+    asked: dict[str, Any] | None = None
+
+
+def go_on(
+    scene: Scene,
+    *,
+    n_particles: int,
+    energy: float,
+    n_cycles: int = 1,
+    seed: int = 0,
+    first: int = 0,
+    threads: int | None = None,
+    phases: Sequence[float] = (),
+    progress: Callable[[int], None] | None = None,
+    before: Paused | None = None,
+) -> Paused:
+    """Simulate an ensemble that can be continued. The arguments are those of `fast.simulate`.
+
+    `before` is the result of the same call with fewer cycles, or None to begin. `n_cycles` counts all
+    cycles, including those of `before`.
+
+    Returns:
+        The ensemble that `fast.simulate` returns, to the bit, and the data needed to continue it. A particle
+        that was lost before, or had a collision within rounding of the end, is followed from its start.
+
+    Raises:
+        BadInput: naming field, value and bound; `before` has another scene, energy, seed, first, phases or
+            size; or the cycles reach a time at which the lanes no longer resolve the phases of the laws.
+    """
+    plan = planned(scene, n_particles, energy, n_cycles, seed, first, threads, phases, progress)
+    own: dict[str, Any] = {"seed": plan.seed, "first": plan.first, "phases": check_phases(phases)}
+    asked = {"table": type(scene).__name__, **laws(scene), **own}
+    if before is None:
+        done, seconds = plan.followed(plan.starts(), LANE_ROWS)
+        return Paused(plan.ensemble(done, seconds), done.lanes, asked)
+    n_before, n_passed = _passed(plan, before)
+    _check_same(asked if before.asked is None else before.asked, asked)
+    done, seconds = plan.followed(np.full((n_particles, 6), np.nan), LANE_ROWS, before.lanes, n_passed)
+    after, anew = plan.ensemble(done, seconds), np.flatnonzero(done.codes == records.ANEW)
+    for name in BY_CYCLE:
+        getattr(after, name)[:, :n_before] = getattr(before.ensemble, name)
+    if len(anew):
+        starts = plan.starts()[anew]
+        again, more = plan._replace(progress=None).followed(starts, LANE_ROWS)
+        fresh, seconds = plan.ensemble(again, more), seconds + more
+        for name in Ensemble._fields[1:-2]:
+            getattr(after, name)[anew] = getattr(fresh, name)
+        done.lanes[anew] = again.lanes
+    seconds += before.ensemble.seconds * before.ensemble.threads / plan.threads
+    return Paused(after._replace(seconds=seconds), done.lanes, asked)
+
+
+def _check_same(there: dict[str, Any], asked: dict[str, Any]) -> None:
+    # Two runs of one shape would be joined without a seam: some particles of one, some of the other.
+    for name in dict.fromkeys((*asked, *there)):
+        if repr(there.get(name)) != repr(asked.get(name)):  # a caller's own may not compare
+            raise BadInput(f"before: {name} = {there.get(name)}, must be {asked.get(name)}")
+
+
+def _passed(plan: Plan, before: Paused) -> tuple[int, int]:
+    """Return how many cycles and stops an ensemble has passed, after a look at whether it can go on so."""
+    n, n_cycles, looks = plan.size
+    if not (
+        isinstance(before, Paused)
+        and isinstance(before.ensemble, Ensemble)
+        and np.ndim(before.lanes) == 2
+        and isinstance(before.asked, dict | None)
+    ):
+        raise BadInput(f"before = {shown(before)}, must be None or what go_on has returned")
+    old = before.ensemble
+    n_before = old.cycle_energies.shape[1]
+    there = (old.energy0, *before.lanes.shape, old.phase_energies.shape[2], old.t_in.shape[2])
+    wanted = (plan.energy0, n, LANE_ROWS, looks - 1, plan.stops.narrowings.shape[1])
+    for name, found, value in zip(
+        ("energy", "n_particles", "rows of lanes", "phases", "narrowings"), there, wanted, strict=True
+    ):
+        if found != value:
+            raise BadInput(f"before: {name} = {found}, must be {value}")
+    if not 1 <= n_before <= n_cycles:
+        raise BadInput(f"n_cycles = {n_cycles}, must be at least the {n_before} of before")
+    n_passed = n_before * (len(plan.stops.times) // n_cycles)
+    in_lanes, times = laws_in_lanes(plan.scene), plan.stops.times
+    if is_known_throughout(in_lanes, times[n_passed - 1]) != is_known_throughout(in_lanes, times[-1]):
+        raise BadInput(
+            f"n_cycles = {n_cycles}: beyond the time up to which lanes know the laws' phases. Lanes followed"
+            f" the first {n_before} cycles: they cannot be gone on from"
+        )
+    return n_before, n_passed

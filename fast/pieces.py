@@ -23,17 +23,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.compiled import HALF_PI, compile_scene
-from fast.kernel import entries
 from fast.kernel.arithmetic import MAX_QUADRANT
-from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
-from fast.kernel.pieces import PARABOLA, SERIES
+from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, PARABOLA, SERIES, TWO_WAVES, fill_pieces
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, BANG_BANG, CONSTANT, DEPTH, FOURIER, KIND, KNOTS, LEVEL, LOWEST, N_HARMONICS,
-    N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled, FloatArray,
-    LawsInLanes, Pieces, LaneWaves,
+    AMPLITUDES, BANG_BANG, CONSTANT, DEPTH, FOURIER, KIND, KNOTS, LEVEL, LOWEST, N_HARMONICS, N_KNOTS,
+    OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled, FloatArray, LaneWaves,
+    LawsInLanes, Pieces,
 )  # fmt: skip
+from fast.units import HALF_PI, compile_scene
 from scene import Scene
 
 SHALLOW = 0.25  # of its mean: see `waves_of`
@@ -195,7 +193,7 @@ def _filled(
     middles = [origin + cut.begin + cut.holds / 2 for cut in cuts]
     references = np.array([_pair(middle) for middle in middles])
     coefficients = np.empty((len(cuts), 4, degree + 2))
-    entries.fill_pieces(compiled.laws, references, coefficients)
+    fill_pieces(compiled.laws, references, coefficients)
     begins = np.array([float(cut.begin) for cut in cuts])
     half = INSIDE * np.array([float(cut.holds / 2) for cut in cuts])
     serves = np.array([float(cut.serves - cut.holds / 2) for cut in cuts])

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from mpmath import fp
 
-from fast.given import MOST_IN_CYCLES, MOST_TO_A_TIME
-from fast.kernel import entries
+from fast.kernel.arithmetic import directions
 from fast.kernel.records import FloatArray, Stops
+from fast.validation import MOST_IN_CYCLES, MOST_TO_A_TIME
 from scene import Scene
 from scene.geometry import table_at
 from scene.laws import bounds
@@ -30,7 +30,7 @@ def initial_states(scene: Scene, n_particles: int, energy: float, seed: int, fir
     """
     # One Philox block gives four numbers, and four is what a particle needs.
     raw = np.random.Philox(key=seed, counter=first).random_raw(4 * n_particles).reshape(n_particles, 4)
-    u = (raw >> np.uint64(11)) * 2.0**-53
+    u = (raw >> np.uint64(11)).astype(np.float64) * 2.0**-53
     start = start_time(scene)
     x, y = _uniform_in_area(scene, start, u[:, 0], u[:, 1], u[:, 2])
     speed, along = math.sqrt(2.0 * energy), _directions(u[:, 3])
@@ -54,7 +54,7 @@ def _uniform_in_area(
 def _directions(turns: FloatArray) -> FloatArray:
     """Return (n, 2) unit vectors at whole turns from the x axis."""
     out = np.empty((len(turns), 2))
-    entries.directions(np.ascontiguousarray(turns), out)
+    directions(np.ascontiguousarray(turns), out)
     return out
 
 

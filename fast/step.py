@@ -8,11 +8,11 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from fast.given import MOST_TO_A_TIME, given_state
-from fast.kernel import careful, codes, entries, single
-from fast.kernel.loops import careful_at
-from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, Paths, unfilled_paths
+from fast.kernel import records, scalar_step, single
+from fast.kernel.records import Compiled, FloatArray, IntArray, Particle
+from fast.kernel.worker import careful_at
 from fast.units import ANSWER_LOST, LateTime, Units, fit
+from fast.validation import MOST_TO_A_TIME, check_state
 from scene import (
     Collision,
     Horizon,
@@ -31,26 +31,26 @@ from scene.refusal import BadInput, check_number
 from scene.states import check_numbers
 
 WALL_NAMES: dict[int, Wall] = {
-    int(codes.ARC): "arc",
-    int(codes.BASE): "base",
-    int(codes.LEFT): "left",
-    int(codes.RIGHT): "right",
-    int(codes.FLOOR): "floor",
+    int(records.ARC): "arc",
+    int(records.BASE): "base",
+    int(records.LEFT): "left",
+    int(records.RIGHT): "right",
+    int(records.FLOOR): "floor",
 }
-WALL_CODES: dict[Wall | None, int] = {None: int(codes.NO_WALL)} | {n: c for c, n in WALL_NAMES.items()}
+WALL_CODES: dict[Wall | None, int] = {None: int(records.NO_WALL)} | {n: c for c, n in WALL_NAMES.items()}
 REASONS: dict[int, Outcome] = {
-    int(codes.SLIDING): Undefined("sliding"),
-    int(codes.MOUTH_EDGE): Undefined("mouth-edge"),
-    int(codes.ON_CORNER): Undefined("corner"),
-    int(codes.TOO_MANY): Undecided(f"no hit within {careful.MAX_PARABOLAS} sub-intervals"),
-    int(codes.TANGENT): Undecided("f and f' vanish together within rounding"),
-    int(codes.CORNER): Undecided("two walls are hit together within rounding"),
-    int(codes.EDGE): Undecided("the mouth's edge is hit within rounding"),
-    int(codes.AT_END): Undecided("a wall is hit at the horizon within rounding"),
-    int(codes.START): Undecided("the state is on another wall within rounding"),
-    int(codes.TOO_FAR): Undecided(f"t_end is over {MOST_TO_A_TIME:.0e} collisions away"),
+    int(records.SLIDING): Undefined("sliding"),
+    int(records.MOUTH_EDGE): Undefined("mouth-edge"),
+    int(records.ON_CORNER): Undefined("corner"),
+    int(records.TOO_MANY): Undecided(f"no hit within {scalar_step.MAX_PARABOLAS} sub-intervals"),
+    int(records.TANGENT): Undecided("f and f' vanish together within rounding"),
+    int(records.CORNER): Undecided("two walls are hit together within rounding"),
+    int(records.EDGE): Undecided("the mouth's edge is hit within rounding"),
+    int(records.AT_END): Undecided("a wall is hit at the horizon within rounding"),
+    int(records.START): Undecided("the state is on another wall within rounding"),
+    int(records.TOO_FAR): Undecided(f"t_end is over {MOST_TO_A_TIME:.0e} collisions away"),
     int(single.ANSWER_LOST): Undecided(ANSWER_LOST),
-    int(codes.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
+    int(records.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
 }
 
 
@@ -81,19 +81,19 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         t_end = t_end if type(t_end) is float else check_number("t_end", t_end)
         # What is common is not worth a call: a State of floats, in the scene of the question before.
         if known is None or type(state) is not State:
-            state = given_state(scene, state)
+            state = check_state(scene, state)
             known = prepare(scene, state, t_end)
         t, x, y, vx, vy, wall = state.t, state.x, state.y, state.vx, state.vy, state.wall
         is_plain = type(t) is type(x) is type(y) is type(vx) is type(vy) is float
         if not is_plain or (wall is not None and not (isinstance(wall, str) and wall in known.walls)):
-            state = given_state(scene, state)
+            state = check_state(scene, state)
             t, x, y, vx, vy, wall = msgspec.structs.astuple(state)
         code, dt, t, x, y, vx, vy = known.single(
             known.step_at, known.packed, t, x, y, vx, vy, known.walls[wall], t_end
         )
         if code in WALL_NAMES:
             return Collision(WALL_NAMES[code], dt, t, x, y, vx, vy)
-        if code == codes.HORIZON:
+        if code == records.HORIZON:
             return Horizon(t_end, x, y, vx, vy)
         if code == single.REFUSED:  # by the checks that follow, made in compiled code: they say why
             check_numbers(scene, state, t_end)
@@ -138,26 +138,8 @@ def prepare(scene: Scene, state: State, t_end: float) -> Prepared:
         check_numbers(scene, state, t_end)
         raise
     walls = {wall: WALL_CODES[wall] for wall in (None, *scene.walls)}
-    found = latest[0] = Prepared(scene, packed, walls, careful_at(), entries.single_at_once())
+    found = latest[0] = Prepared(scene, packed, walls, careful_at(), single.single_at_once())
     return found
-
-
-def followed_paths(
-    compiled: Compiled, states: FloatArray, walls: IntArray, n_collisions: int, t_end: float, n_times: int = 1
-) -> Paths:
-    """Follow each of N states by careful steps, all in the kernel's units.
-
-    Args:
-        compiled: the scene's numbers.
-        states: (N, 6) t, its low part, x, y, vx, vy.
-        walls: (N,) codes of the walls that they leave.
-        n_collisions: how many collisions to follow.
-        t_end: horizon [time]; infinity for none.
-        n_times: how often to do all this, where its time is measured.
-    """
-    paths = unfilled_paths(len(states), n_collisions)
-    entries.careful(careful_at(), compiled, np.zeros(ANCHORS_SHAPE), states, walls, t_end, n_times, paths)
-    return paths
 
 
 class Start(NamedTuple):
@@ -179,9 +161,9 @@ class Start(NamedTuple):
         return np.array([s.t, 0.0, s.x, s.y, s.vx, s.vy])
 
 
-def check_state(scene: Scene, state: State, t_end: float | None = None) -> Start:
+def start_at(scene: Scene, state: State, t_end: float | None = None) -> Start:
     """Return a state in the kernel's units; refuse what this stepper cannot hold, naming field and bound."""
-    state = given_state(scene, state)
+    state = check_state(scene, state)
     check_numbers(scene, state, state.t if t_end is None else t_end)
     return fitted_start(scene, state)
 
@@ -197,7 +179,7 @@ def fitted_start(scene: Scene, state: State) -> Start:
     inner = units.state(state)
     if state.wall is not None:
         particle = Particle(inner.t, 0.0, inner.x, inner.y, inner.vx, inner.vy, WALL_CODES[state.wall])
-        share = entries.off_wall(careful_at(), fitted.compiled, particle)
+        share = single.off_wall(careful_at(), fitted.compiled, particle)
         if share:
             away = f"{share:.3g} of that wall's size"
             raise InvalidState(f"state.wall = {state.wall!r}, but the state is {away} away from that wall")
@@ -220,13 +202,13 @@ def trouble(code: int, scene: Scene, state: State, n: int = 0) -> Outcome:
 
     A state is refused before the first of them only: later, what looks like one beyond a wall is rounding.
     """
-    if code == codes.START and not n:
+    if code == records.START and not n:
         wall = rounded(scene, state.t).nearest_wall(state.x, state.y, but=state.wall)
         return Undecided(placed(scene, state, wall, "within rounding of"))
     since = f"{n} collisions after state.t = {state.t!r}" if n else f"state.t = {state.t!r}"
-    if code == codes.FAR_TIME:
+    if code == records.FAR_TIME:
         return Undecided(f"{since}: {TOO_LATE}")
     found = REASONS.get(code)
     if n and (found is None or isinstance(found, Rejected)):
         return Undecided(f"{since}: rounding puts the particle beyond a wall")
-    return found or Rejected(placed(scene, state, WALL_NAMES[int(code - codes.BEYOND)], "beyond"))
+    return found or Rejected(placed(scene, state, WALL_NAMES[int(code - records.BEYOND)], "beyond"))

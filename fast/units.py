@@ -8,27 +8,134 @@ makes each state's speed what it should be.
 
 Every change of units is exact or refused: scaling by a power of two loses bits only where numbers become
 subnormal or infinite. The kernel's sizes are well above 1 (2^96 for a length, 2^32 for a time) so that the
-least of all floats, beside a table of common size, comes in exactly too.
+least of all floats, beside a table of common size, comes in exactly too. `compile_scene` lays out a scene as
+the numbers that the kernels read.
 """
 
 from __future__ import annotations
 
 import math
 import sys
+from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from fast.compiled import compile_scene
-from fast.kernel.records import BoolArray, Compiled, FloatArray, IntArray
-from fast.kernel.single import LARGEST, LENGTH, TIME, packed, static_time
-from scene import BangBang, Fourier, InvalidState, Law, Scene, State
-from scene.refusal import BadInput
-from scene.tables import laws, period
+from fast.kernel import records
+from fast.kernel.arithmetic import half_pi
+from fast.kernel.single import LARGEST, LENGTH, TIME, pack_scene, static_time
 
-FARTHEST = 1000  # powers of two up to this, and their inverses, are floats
+from fast.kernel.records import (  # isort: skip
+    BANG_BANG, CONSTANT, FOURIER, KIND, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, BoolArray, Compiled,
+    FloatArray, IntArray,
+)  # fmt: skip
+from scene import BangBang, Cap, Fourier, InvalidState, Law, Mushroom, Scene, State
+from scene.laws import Bounds, bounds, is_constant
+from scene.refusal import BadInput
+from scene.sizes import size_bounds
+from scene.tables import laws, period, width_factors
+
+HALF_PI = half_pi()
+TABLES = {"Cap": int(records.CAP), "Stem": int(records.STEM), "Mushroom": int(records.MUSHROOM)}
+
+
+@lru_cache(maxsize=256)
+def compile_scene(scene: Scene) -> Compiled:
+    """Lay out a valid scene for the kernel.
+
+    Raises:
+        BadInput: a length, speed or acceleration of a wall is 2^400 or more: squares would overflow.
+    """
+    try:
+        compiled = _laid_out(scene)
+    except OverflowError:
+        raise BadInput("scene: a wall's acceleration overflows, must be below 2^400") from None
+    for name, row in zip(("r", "w", "h", "slope"), compiled.bounds, strict=True):
+        for what, size in zip(("least value", "greatest value", "speed", "acceleration"), row, strict=True):
+            if not abs(size) < LARGEST:
+                raise BadInput(f"scene.{name}: {what} {size:.3g}, must be below 2^400 in size")
+    return compiled
+
+
+def _laid_out(scene: Scene) -> Compiled:
+    r: Law = 0.0 if not isinstance(scene, (Cap, Mushroom)) else scene.r
+    h: Law = 0.0
+    slope: Law = 0.0
+    factors: tuple[Law, ...] = (0.0,)
+    if not isinstance(scene, Cap):
+        h, slope, factors = scene.h, scene.slope, width_factors(scene)
+    rows = [_row(law) for law in (r, factors[0], h, slope)]
+    waves = [row for row in rows if row[KIND] == FOURIER]
+    moving = [law for law in (r, *factors, h, slope) if isinstance(law, Fourier) and not is_constant(law)]
+    omega_low = _omega(moving[0])[1] if moving else 0.0
+    laws = np.zeros((len(rows) + 1, max(OMEGA_LOW + 1, *(len(row) for row in rows))))
+    for i, row in enumerate(rows):
+        laws[i, : len(row)] = row
+    for row in waves:
+        laws[SHARED, OMEGA], laws[SHARED, OMEGA_LOW] = row[OMEGA], omega_low
+        laws[SHARED, N_HARMONICS] = max(laws[SHARED, N_HARMONICS], row[N_HARMONICS])
+    limits = np.array([size_bounds(r), _product_bounds(factors), size_bounds(h), bounds(slope)])
+    return Compiled(TABLES[type(scene).__name__], len(factors) == 2, laws, limits)
+
+
+def _omega(law: Fourier) -> tuple[float, float]:
+    """Return a law's frequency as a sum of two floats: exact if given, else 2 pi / period to 2^-106."""
+    if law.omega is not None:
+        return law.omega, 0.0
+    assert law.period is not None
+    frequency = 4 * HALF_PI / Fraction(law.period)
+    high = float(frequency)
+    return high, float(frequency - Fraction(high))
+
+
+def _row(law: Law) -> list[float]:
+    if isinstance(law, Fourier) and not is_constant(law):
+        n = max(len(law.cos), len(law.sin))
+        cos = list(law.cos) + [0.0] * (n - len(law.cos))
+        sin = list(law.sin) + [0.0] * (n - len(law.sin))
+        return [FOURIER, law.mean, _omega(law)[0], float(n), *cos, *sin]
+    if isinstance(law, BangBang) and not is_constant(law):
+        times = [knot[0] for knot in law.knots]
+        values = [knot[1] for knot in law.knots]
+        legs = zip(law.knots, law.knots[1:], strict=False)
+        accelerations = [
+            4 * (Fraction(v1) - Fraction(v0)) / (Fraction(t1) - Fraction(t0)) ** 2
+            for (t0, v0), (t1, v1) in legs
+        ]
+        accelerations.append(Fraction(0))  # one for every knot keeps the columns simple
+        highs = [float(a) for a in accelerations]
+        period = Fraction(times[-1]) - Fraction(times[0])
+        return [
+            BANG_BANG,
+            0.0,
+            float(period),
+            float(len(times)),
+            float(period - Fraction(float(period))),
+            *times,
+            *values,
+            *highs,
+            *(float(a - Fraction(high)) for a, high in zip(accelerations, highs, strict=True)),
+        ]
+    constant = law if isinstance(law, float) else law.mean if isinstance(law, Fourier) else law.knots[0][1]
+    return [CONSTANT, constant, 0.0, 0.0]
+
+
+def _product_bounds(factors: tuple[Law, ...]) -> Bounds:
+    if len(factors) == 1:
+        return size_bounds(factors[0])
+    nu, r = size_bounds(factors[0]), size_bounds(factors[1])
+    # Leibniz, rounded outward by a few units in the last place; nu and r are positive.
+    grow = 1.0 + 2.0**-50
+    return Bounds(
+        nu.lowest * r.lowest / grow,
+        nu.highest * r.highest * grow,
+        (nu.slope * r.highest + nu.highest * r.slope) * grow,
+        (nu.curvature * r.highest + 2 * nu.slope * r.slope + nu.highest * r.curvature) * grow,
+    )
+
+
 ANSWER_LOST = "the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023"
 
 
@@ -52,9 +159,8 @@ class Units(NamedTuple):
         Raises:
             InvalidState: it is too fast or too slow for its table, or loses bits beside the table's size.
         """
-        speed = self.length - self.time
-        exponents = {"t": self.time, "x": self.length, "y": self.length, "vx": speed, "vy": speed}
-        inner = {name: inward(f"state.{name}", getattr(state, name), e) for name, e in exponents.items()}
+        exponents = zip(("t", "x", "y", "vx", "vy"), self.of_step()[1:].tolist(), strict=True)
+        inner = {name: inward(f"state.{name}", getattr(state, name), e) for name, e in exponents}
         for name in ("x", "y", "vx", "vy"):
             if not abs(inner[name]) <= LARGEST:
                 raise InvalidState(
@@ -80,46 +186,14 @@ class Units(NamedTuple):
             return math.copysign(sys.float_info.max, t_end)
         return inward("t_end", t_end, self.time)
 
-    def steps(self, rows: FloatArray) -> FloatArray:
-        """Return rows of [dt, t, x, y, vx, vy], each a number or a pair, in the scene's units."""
-        exponents = self._of_step()
-        return outward(rows, exponents if rows.shape[-1] == 6 else exponents[:, None])
-
-    def keeps(self, rows: FloatArray) -> BoolArray:
-        """Tell which of N rows of ([dt,] t, x, y, vx, vy) lose no bit in the scene's units."""
-        _, is_kept = scaled(rows, self._of_step()[-rows.shape[-1] :])
-        return np.asarray(is_kept.all(axis=1))
-
-    def keeps_times(self, rows: FloatArray) -> BoolArray:
-        """Tell which of N rows of times lose no bit in the scene's units; nan stands for none."""
-        _, is_kept = scaled(rows, np.array(self.time))
-        return np.asarray(is_kept.all(axis=1))
-
-    def n_exact(self, rows: FloatArray) -> int:
-        """Return how many of N rows of [dt, t, x, y, vx, vy] come before the first that loses a bit."""
-        return int(np.append(self.keeps(rows), False).argmin())
-
-    def factors(self) -> FloatArray | None:
-        """Return by what dt, t, x, y, vx, vy are multiplied; None where no product does it."""
-        exponents = self._of_step()
-        return np.ldexp(1.0, exponents) if int(np.abs(exponents).max()) <= FARTHEST else None
-
-    def _of_step(self) -> IntArray:
+    def of_step(self) -> IntArray:
+        """Return the exponents of dt, t, x, y, vx, vy, each times a power of two in the kernel."""
         speed = self.length - self.time
         return np.array([self.time, self.time, self.length, self.length, speed, speed])
 
-    def places(self, rows: FloatArray) -> FloatArray:
-        """Return rows of [x, y, vx, vy] in the scene's units."""
-        speed = self.length - self.time
-        return outward(rows, np.array([self.length, self.length, speed, speed]))
-
-    def times(self, numbers: FloatArray) -> FloatArray:
-        """Return times in the scene's units."""
-        return outward(numbers, np.array(self.time))
-
-    def energies(self, numbers: FloatArray) -> FloatArray:
-        """Return energies, squares of speeds, in the scene's units."""
-        return outward(numbers, np.array(2 * (self.length - self.time)))
+    def of_energy(self) -> int:
+        """Return the exponent of an energy, the square of a speed."""
+        return 2 * (self.length - self.time)
 
 
 class Fitted(NamedTuple):
@@ -168,7 +242,7 @@ def fit(scene: Scene) -> Fitted:
     }
     fitted = msgspec.structs.replace(scene, **changed)
     compiled = compile_scene(fitted)
-    return Fitted(fitted, length, time, compiled, packed(compiled, length, time))
+    return Fitted(fitted, length, time, compiled, pack_scene(compiled, length, time))
 
 
 def exponent(size: float) -> int:
@@ -203,14 +277,14 @@ def inward(field: str, number: float, exponent: int) -> float:
     raise refusal(f"{field} = {number!r}, must be {bound} beside the table's size and period")
 
 
-def scaled(numbers: FloatArray, exponents: IntArray) -> tuple[FloatArray, BoolArray]:
+def scaled(numbers: FloatArray, exponents: IntArray | int) -> tuple[FloatArray, BoolArray]:
     """Return kernel numbers times 2^exponents, and which of them lost no bit; infinity and nan lose none."""
     with np.errstate(over="ignore", under="ignore"):
         found = np.ldexp(numbers, exponents)
         return found, (np.ldexp(found, -exponents) == numbers) | ~np.isfinite(numbers)
 
 
-def outward(numbers: FloatArray, exponents: IntArray) -> FloatArray:
+def outward(numbers: FloatArray, exponents: IntArray | int) -> FloatArray:
     """Return kernel numbers times 2^exponents, exactly; infinities and nans as they are.
 
     Raises:

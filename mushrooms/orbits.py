@@ -22,8 +22,8 @@ from mpmath import fp
 
 import scene as scenes
 from conformance.files import write_file
-from fast.given import given_energy
-from fast.until import captured, sin_phi
+from fast.paths import captured, sin_phi
+from fast.validation import check_energy
 from mushrooms.output import import_arrow
 from scene import Outcome, Scene, State, Stem, Wall
 from scene.geometry import TableAt, table_at
@@ -271,7 +271,7 @@ def follow(
     n_collisions = check_count("n_collisions", n_collisions, 1, MAX_COLLISIONS)
     n_orbits = check_count("n_orbits", n_orbits, 1, MAX_ORBITS)
     seed = check_seed(seed)
-    energy = usual_energy(scene) if energy is None else given_energy(energy)
+    energy = usual_energy(scene) if energy is None else check_energy(energy)
     end = math.inf
     if n_cycles is not None:
         n_cycles = check_count("n_cycles", n_cycles, 1, MAX_COLLISIONS)

@@ -16,8 +16,8 @@ from rich.progress import Progress
 import fast
 from conformance.audit.runs import scene_named
 from conformance.files import write_file
-from fast.given import given_phases
 from fast.starts import one_cycle
+from fast.validation import check_phases
 from mushrooms import compared, output
 from mushrooms.forecast import careful_note
 from mushrooms.main import tell_interrupted
@@ -173,7 +173,7 @@ def _phases(text: str | None) -> tuple[float, ...]:
     if text is None:
         return ()
     try:
-        return given_phases([float(part) for part in text.split(",")])
+        return check_phases([float(part) for part in text.split(",")])
     except ValueError:  # BadInput is one
         raise BadInput(f"--phases = {text}, must be numbers that rise and lie in (0, 1)") from None
 

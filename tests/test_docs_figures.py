@@ -20,8 +20,8 @@ from conformance.mutants import MUTANTS
 from conformance.suite.checks.flows import MAX_STATES
 from conformance.suite.checks.paths import MAX_HITS, MAX_WAIT
 from conformance.suite.checks.refusals import MOST_SAMPLES
-from fast.given import MAX_CYCLES, MOST_IN_CYCLES, MOST_TO_A_TIME
-from fast.kernel.kept import LANE_ROWS
+from fast.kernel.follow import LANE_ROWS
+from fast.validation import MAX_CYCLES, MOST_IN_CYCLES, MOST_TO_A_TIME
 from mushrooms.orbits import MAX_COLLISIONS, MAX_ORBITS
 from mushrooms.simulate import MOST_IN_MEMORY, MOST_ON_DISK
 from mushrooms.store import conduct

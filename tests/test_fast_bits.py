@@ -1,26 +1,19 @@
-"""Bits: the same for any threads, chunks, lane position and cache; symmetries exact on whole trajectories."""
+"""Bits: the same for any threads, chunks and lane position; symmetries exact on whole trajectories."""
 
 from __future__ import annotations
 
 import os
-import runpy
-import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import config
-from numba.core.caching import IndexDataCacheFile
-from support.entries import kept_entries
 
 import fast
 from conformance.strategies import scenes_and_states
 from fast import ensemble
-from fast.kernel import compiling
 from scene import State, load
 from scene.transforms import mirrored, mirrored_wall, scaled, scaled_state
 
@@ -65,16 +58,6 @@ def test_lane_positions_do_not_change_a_bit():
     assert one.n_careful.sum() < 0.1 * one.wall_counts.sum()
 
 
-HALF_KEPT = """
-from fast.kernel.compiling import kept
-
-def made(number, variant):
-    @kept(variant)
-    def entry(x):
-        return x + number
-
-    return entry
-"""
 PROGRAM = """
 import fast, scene
 path = fast.trajectory(scene.load("moving-cap"), scene.State(0.0, 0.1, 0.3, 20.0, 7.0), 40)
@@ -98,47 +81,6 @@ def test_same_bits_without_the_compiler():
         results.append(run.stdout)
     assert results[0] == results[1]
     assert results[0].count("True") == 2
-
-
-def test_a_change_in_any_source_makes_the_kernels_anew(tmp_path):
-    """Numba's cache looks at one file only; the digest in the names of its files looks at all."""
-    folder = Path(fast.__file__).parent
-    copy = shutil.copytree(folder, tmp_path / "fast", ignore=shutil.ignore_patterns("__pycache__"))
-    assert compiling.digest_of_sources(copy) == compiling.SOURCES
-    for path in (copy / "units.py", copy / "kernel" / "walls.py"):
-        path.write_text(path.read_text("utf-8") + "\n", "utf-8")
-        assert compiling.digest_of_sources(copy) != compiling.SOURCES
-        path.write_text(path.read_text("utf-8")[:-1], "utf-8")
-    names = [entry.py_func.__qualname__ for entry in kept_entries()]
-    assert all(compiling.SOURCES[:16] in name for name in names)
-    assert len(set(names)) == len(names)
-
-
-@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is kept without the compiler")
-@pytest.mark.parametrize("what", ["variant", "sources", "processor"])
-def test_what_was_half_kept_leads_to_no_other_code(tmp_path, monkeypatch, what):
-    """The process ends when numba has written the index and not yet the code: that of another is there."""
-    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "kept"))
-    source = tmp_path / "half_kept.py"
-
-    def called(number: float) -> float:
-        source.write_text(f"{HALF_KEPT}\n# {number}\n")  # of another file numba forgets the index
-        if what == "sources":
-            monkeypatch.setattr(compiling, "SOURCES", f"{number:016}")
-        elif what == "processor":
-            monkeypatch.setattr(compiling, "TOOLS", (*compiling.TOOLS[:2], f"{number}", compiling.TOOLS[3]))
-        module = runpy.run_path(str(source))
-        return float(module["made"](number, number if what == "variant" else 0.0)(0.0))
-
-    def ended(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    assert called(1.0) == 1.0
-    with monkeypatch.context() as context:
-        context.setattr(IndexDataCacheFile, "_save_data", ended)
-        with pytest.raises(KeyboardInterrupt):
-            called(2.0)
-    assert called(2.0) == 2.0
 
 
 @settings(max_examples=60)

@@ -13,8 +13,8 @@ import pytest
 
 import fast
 import reference
-from fast import compiled, pieces, units
-from fast.compiled import compile_scene
+from fast import pieces, units
+from fast.units import compile_scene
 from scene import BadInput, Cap, Collision, Fourier, Horizon, Mushroom, State, Stem
 from scene.geometry import rounded
 from scene.laws import bounds, values
@@ -114,7 +114,7 @@ def forgetful():
 
 
 def test_with_the_bounds_as_they_are_some_would_be(monkeypatch, forgetful, tally):
-    monkeypatch.setattr(compiled, "size_bounds", bounds)
+    monkeypatch.setattr(units, "size_bounds", bounds)
     assert wrong_steps(150, tally) != []
 
 

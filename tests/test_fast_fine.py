@@ -18,11 +18,12 @@ import reference
 from conformance.grading.agreement import compare
 from conformance.grading.agreement import exact as enclosed
 from conformance.strategies import scenes_and_states
-from fast.compiled import compile_scene
-from fast.fine import fill_path
-from fast.kernel import codes
-from fast.kernel import double_double as dd
+from fast.kernel import arithmetic as dd
+from fast.kernel import records
+from fast.kernel.fine_step import fine_path
+from fast.kernel.records import ANCHORS_SHAPE
 from fast.step import WALL_CODES
+from fast.units import compile_scene
 from scene import Collision, Mushroom, State, Stem, Undecided, load
 from scene.geometry import table_at
 from scene.tables import period
@@ -30,7 +31,7 @@ from scene.tables import period
 N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "250"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
 SHARP = 4.0  # units that nearly all answers keep
-WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.kernel.refine
+WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.kernel.fine_step
 # So soon, in periods, or leaving its wall so slowly, in parts of the speed, that terms cancel.
 BRIEF, GRAZING = 2.0**-33, 2.0**-36
 START = State(0.1, 0.2, 0.3, 140.0, 30.0)
@@ -60,7 +61,7 @@ def test_sine_and_cosine_to_32_decimals(angle):
 
     with mp.workdps(60):
         truth = mp.sin(mp.mpf(angle)), mp.cos(mp.mpf(angle))
-        *found, is_in_reach = from_python(dd.sine_cosine)((angle, 0.0))
+        *found, is_in_reach = from_python(dd.fine_sine_cosine)((angle, 0.0))
         assert is_in_reach
         for a, b in zip(found, truth, strict=True):
             assert abs(mp.mpf(float(a[0])) + mp.mpf(float(a[1])) - b) <= mp.mpf(2) ** -103 * max(
@@ -156,5 +157,7 @@ def test_rounding_a_state_of_pairs_is_not_taken_for_a_gap():
     scene, d = Stem(w=1.0, h=1.0), round(1e-10 * 2**53) * 2.0**-53
     start = np.array([[0.0, 0.0], [1.0 - d, 0.0], [d - 1.0, -5e-17], [1.0, 0.0], [2e-7 - 1.0, 0.0]])
     steps, met = np.empty((1, 6, 2)), np.empty(1, dtype=np.int64)
-    n, code = fill_path(compile_scene(scene), start, WALL_CODES[None], steps, met)
-    assert (n, code) == (0, codes.CORNER)
+    anchors, called_off = np.zeros(ANCHORS_SHAPE), np.zeros(1, np.int64)
+    compiled, wall = compile_scene(scene), WALL_CODES[None]
+    n, code = fine_path(compiled, anchors, start, wall, np.inf, steps, met, called_off)
+    assert (n, code) == (0, records.CORNER)

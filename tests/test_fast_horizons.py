@@ -62,7 +62,7 @@ def test_a_stepper_that_looks_for_sides_below_the_floor_misses_it(tmp_path):
     order = "for candidate in (FLOOR, LEFT, RIGHT):"
     assert output_of(tmp_path / "honest", PROGRAM).strip() == "floor"
     faulty = output_of(
-        tmp_path / "faulty", PROGRAM, "careful.py", order, "for candidate in (LEFT, RIGHT, FLOOR):"
+        tmp_path / "faulty", PROGRAM, "scalar_step.py", order, "for candidate in (LEFT, RIGHT, FLOOR):"
     )
     assert faulty.strip() == "left"
 

@@ -21,7 +21,7 @@ from support.lane_traps import TRAPS
 import fast
 import reference
 from fast.batch import LaneRound, lane_steps
-from fast.kernel import codes, lanes, pools
+from fast.kernel import lanes, pools, records
 from fast.step import WALL_NAMES
 from scene import Cap, Collision, Fourier, Mushroom, Rejected, State
 
@@ -313,7 +313,7 @@ def count_wrong_corners(draw, kernels, n_scenes, tally):
             code, _ = pool.careful(*starts[i])
             tally["answered"] += 1
             # What the careful step cannot decide, or refuses, it cannot contradict.
-            tally["wrong"] += code < codes.HORIZON and code != hits[i]
+            tally["wrong"] += code < records.HORIZON and code != hits[i]
     return tally["wrong"]
 
 

@@ -16,18 +16,18 @@ from numba import njit, types
 from support.depth import deep_but
 
 import fast
-from fast.compiled import compile_scene
-from fast.kernel import loops
+from fast.batch import followed_paths
+from fast.kernel import worker
 from fast.kernel.compiling import HOW, TOOLS
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
-from fast.kernel.limits import LawLimits
 from fast.kernel.pools import LANES, POOL_SIZE
 from fast.kernel.records import TableOfLanes
-from fast.kernel.worker import CACHE_LINE, new_pools
+from fast.kernel.worker import CACHE_LINE, LawLimits, new_pools
 from fast.pieces import PARABOLA, SERIES
 from fast.starts import initial_states
-from fast.step import WALL_CODES, followed_paths
+from fast.step import WALL_CODES
+from fast.units import compile_scene
 from scene import BangBang, Cap, Fourier, State, load
 
 N_STEPS = int(os.environ.get("MUSHROOMS_LANE_STEPS", "20000"))
@@ -42,10 +42,10 @@ NUDGE = 2.0**-26
 @pytest.mark.parametrize("loop", ["fly", "chord"])
 def test_the_compiler_packs_divisions_and_square_roots(loop, form, is_slope_moving):
     """Eight lanes to an instruction, where the machine has 512-bit registers, or four of 256."""
-    entry = loops.FLIES[is_slope_moving, form] if loop == "fly" else loops.CHORDS[form]
+    entry = worker.FLIES[is_slope_moving, form] if loop == "fly" else worker.CHORDS[form]
     function = njit(**HOW)(entry.py_func)  # what the disk cache keeps has no text
-    function.compile(loops.STEP.args)
-    assembly = function.inspect_asm(loops.STEP.args)
+    function.compile(worker.STEP.args)
+    assembly = function.inspect_asm(worker.STEP.args)
     if not re.search("vdiv[sp]d", assembly):
         pytest.skip("needs a machine with AVX")
     widest = "z" if "+avx512f" in TOOLS[3] else "y"
@@ -72,8 +72,8 @@ def test_the_width_of_registers_changes_no_bit(step):
 
 def test_an_address_is_refused_to_who_expects_another_result():
     """Called all the same, it would write over what is not its own."""
-    with pytest.raises(TypeError, match="chord_lanes returns none"):
-        loops.address(loops.CHORDS[ONE_WAVE], types.float64(*loops.STEP.args))
+    with pytest.raises(TypeError, match="loop returns none"):
+        worker.address(worker.CHORDS[ONE_WAVE], types.float64(*worker.STEP.args))
 
 
 def moving_cap(**laws):

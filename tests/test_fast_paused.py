@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
+from support.lane_search import draw_scene
 
 import fast
-from fast import paused, pieces
-from fast.kernel import kept
+from fast import ensemble, pieces
+from fast.kernel import follow
 from fast.kernel.arithmetic import MAX_QUADRANT
 from fast.pieces import laws_in_lanes
 from fast.starts import one_cycle
 from fast.units import Units, fit
 from scene import BadInput, BangBang, Cap, Fourier, Mushroom, load
 
+N_DRAWN = int(os.environ.get("MUSHROOMS_GOES", "3"))
 TWICE = tuple(zip(map(float, range(9)), (1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0), strict=True))
 BREATH = ((0.0, 1.0), (2.0, 1.0), (2.5, 1.25), (6.0, 1.25), (6.5, 1.0), (8.0, 1.0))
 WAVE = Fourier(mean=1.0, omega=1.0, sin=(0.3,))
@@ -72,6 +76,29 @@ def test_cycles_in_goes_are_those_at_once(name):
         assert found.ensemble.ns_per_collision() > 0.0
 
 
+def test_slow_particles_of_drawn_scenes_go_on_alike(tally):
+    """A flight lasts for several stops, and for several pieces of the laws; many steps are scalar ones."""
+    random = np.random.default_rng(11)
+    while tally["runs"] < N_DRAWN:
+        scene = draw_scene(random)
+        phases = sorted(random.uniform(0.01, 0.99, int(random.integers(0, 8))).tolist())
+        energy = float(10.0 ** random.uniform(-1, 2)) / one_cycle(scene) ** 2
+        cuts, asked = cuts_of(random, 5), {"n_particles": 30, "energy": energy, "phases": phases}
+        whole = fast.go_on(scene, n_cycles=cuts[-1], **asked)
+        assert is_same(in_goes(scene, cuts, **asked), whole), (scene, cuts, asked)
+        assert np.isfinite(whole.ensemble.cycle_energies[whole.ensemble.outcome == 0]).all()
+        tally["runs"] += 1
+
+
+def test_the_last_energy_is_known_however_the_horizon_is_rounded():
+    """The last flight takes a cycle: its begin plus its length, rounded, may be just before the end."""
+    h = ((0.0, 1.83), (0.24, 1.83), (0.63, 2.71), (0.77, 2.15), (1.0, 1.83))
+    scene = Mushroom(r=1.0, h=BangBang(knots=h), nu=0.2)
+    for n_cycles in (1, 2, 3):
+        run = fast.simulate(scene, n_particles=200, energy=0.3, n_cycles=n_cycles, seed=1)
+        assert np.isfinite(run.energy[run.outcome == 0]).all()
+
+
 def test_cycles_in_goes_without_lanes(monkeypatch):
     """Laws of too many pieces: every step is a careful one."""
     wave = Fourier(mean=1.0, omega=1.0, sin=(0.3, 0.0, 0.05))  # three harmonics: in pieces
@@ -104,11 +131,11 @@ def test_who_cannot_go_on_is_followed_from_the_start(monkeypatch):
     lost.lanes[::3] = np.nan
     assert is_same(fast.go_on(scene, n_cycles=3, before=lost, **asked), three)
     tied = one._replace(lanes=one.lanes.copy())
-    is_right = tied.lanes[:, kept.IS_KNOWN] > 0
+    is_right = tied.lanes[:, follow.IS_KNOWN] > 0
     assert is_right.any()
-    tied.lanes[is_right, kept.FIRST_ROW] -= 0.25 * one_cycle(fit(scene).scene)
+    tied.lanes[is_right, follow.FIRST_ROW] -= 0.25 * one_cycle(fit(scene).scene)
     assert is_same(fast.go_on(scene, n_cycles=3, before=tied, **asked), three)
-    monkeypatch.setattr(paused.codes, "ANEW", 99)  # nobody is followed anew
+    monkeypatch.setattr(ensemble.records, "ANEW", 99)  # nobody is followed anew
     found = fast.go_on(scene, n_cycles=3, before=tied, **asked)
     assert found.ensemble.sha256() != three.ensemble.sha256()
 
@@ -117,10 +144,10 @@ def from_the_last_state(found, units):
     """Return particles that begin a flight where they were when the last cycle ended."""
     lanes, run = found.lanes.copy(), found.ensemble
     rows = [run.t, np.zeros(len(run.t)), run.x, run.y, run.vx, run.vy]
-    sizes = [*units.times(np.ones(2)), *units.places(np.ones((1, 4)))[0]]  # powers of 2
+    sizes = np.ldexp(1.0, units.of_step())  # powers of 2
     for k, (row, size) in enumerate(zip(rows, sizes, strict=True)):
-        lanes[:, kept.FIRST_ROW + k] = row / size
-    lanes[:, kept.FIRST_ROW + 6], lanes[:, kept.IS_KNOWN] = -1.0, 0.0  # on no wall, and no law is known
+        lanes[:, follow.FIRST_ROW + k] = row / size
+    lanes[:, follow.FIRST_ROW + 6], lanes[:, follow.IS_KNOWN] = -1.0, 0.0  # on no wall, and no law is known
     return found._replace(lanes=lanes)
 
 
@@ -137,8 +164,8 @@ def test_a_last_state_is_not_enough():
 
 def test_no_number_of_a_lane_may_be_forgotten(halves):
     """Each is needed somewhere."""
-    needed = {column for column in range(kept.LANE_ROWS) if any(misses(half, column) for half in halves)}
-    assert needed == set(range(kept.LANE_ROWS))
+    needed = {column for column in range(follow.LANE_ROWS) if any(misses(half, column) for half in halves)}
+    assert needed == set(range(follow.LANE_ROWS))
 
 
 def misses(half, column):
@@ -156,7 +183,7 @@ def misses(half, column):
 @pytest.fixture
 def halves(monkeypatch):
     """Return runs that are half done, and what they shall come to; nobody of them is followed anew."""
-    monkeypatch.setattr(paused.codes, "ANEW", 99)
+    monkeypatch.setattr(ensemble.records, "ANEW", 99)
     found = []
     for scene in SCENES.values():
         for energy in (3.0, 300.0):

@@ -13,12 +13,10 @@ from support.from_python import from_python
 
 from conformance.strategies import scenes
 from fast import pieces
-from fast.compiled import compile_scene
-from fast.kernel.lane_laws import ONE_WAVE, TWO_WAVES, fresh_phase, law_of_waves
-from fast.kernel.pieces import law_at, piece_at
+from fast.kernel.lane_laws import ONE_WAVE, TWO_WAVES, fresh_phase, law_at, law_of_waves, piece_at
 from fast.kernel.records import N_HARMONICS, OMEGA, SHARED
 from fast.pieces import PARABOLA, SERIES, laws_in_lanes, waves_of
-from fast.units import fit
+from fast.units import compile_scene, fit
 from scene import BangBang, Cap, Fourier, Mushroom, Stem
 from scene.laws import bounds, value
 from scene.tables import width_factors

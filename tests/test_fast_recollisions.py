@@ -50,7 +50,8 @@ def test_without_the_rest_of_a_hop_speeds_are_wrong(tmp_path):
     old = "s_low, rest = rest_of_hop(s, f, slope_s, particle, scene, anchors), 0.0"
     new = "s_low, rest = 0.0, 0.0"
     honest = [v for _, _, found in again(1, 60) for v in (found.vx, found.vy)]
-    spoilt = [float.fromhex(word) for word in output_of(tmp_path, PROGRAM, "hits.py", old, new).split()]
+    printed = output_of(tmp_path, PROGRAM, "scalar_step.py", old, new)
+    spoilt = [float.fromhex(word) for word in printed.split()]
     off = [abs(a - b) / abs(a or 1.0) for a, b in zip(honest, spoilt, strict=True)]
     assert max(off) > 1e-9
 

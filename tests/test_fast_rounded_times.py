@@ -53,7 +53,12 @@ def test_what_is_decided_is_right(family, tally):
 
 # What is taken out of the kernels, and the family that misses it.
 MUTANTS = {
-    "a wall that has come back": ("after a spike", "careful.py", "if side > 0 and s < limit:", "if s < 0.0:"),
+    "a wall that has come back": (
+        "after a spike",
+        "scalar_step.py",
+        "if side > 0 and s < limit:",
+        "if s < 0.0:",
+    ),
     "the mouth's own motion": (
         "beside a moving mouth",
         "walls.py",
@@ -62,7 +67,7 @@ MUTANTS = {
     ),
     "what is wrong with f' on the way": (
         "along a leaning side",
-        "careful.py",
+        "scalar_step.py",
         "(error + slope_error * h) / -slope",
         "error / -slope",
     ),

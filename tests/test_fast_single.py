@@ -12,9 +12,10 @@ import pytest
 
 import fast
 from fast import step as stepper
-from fast.kernel import codes
+from fast.batch import followed_paths
+from fast.kernel import records
 from fast.kernel.single import REFUSED
-from fast.units import LateTime
+from fast.units import LateTime, outward
 from scene import (
     BadInput,
     Cap,
@@ -52,7 +53,7 @@ def by_separate_checks(scene: Scene, state: State, t_end: float) -> Outcome:
         check_numbers(scene, state, t_end)
         start = stepper.fitted_start(scene, state)
         rows, walls = stepper.as_arrays([start])
-        paths = stepper.followed_paths(start.compiled, rows, walls, 1, start.units.horizon(t_end))
+        paths = followed_paths(start.compiled, rows, walls, 1, start.units.horizon(t_end))
         code = paths.codes.item()
     except LateTime as error:
         return Undecided(str(error))
@@ -60,9 +61,11 @@ def by_separate_checks(scene: Scene, state: State, t_end: float) -> Outcome:
         return Rejected(str(error))
     try:
         if code in stepper.WALL_NAMES:
-            return Collision(stepper.WALL_NAMES[code], *start.units.steps(paths.steps[0, 0]).tolist())
-        if code == codes.HORIZON:
-            return Horizon(t_end, *start.units.places(paths.ends[0, 2:]).tolist())
+            return Collision(
+                stepper.WALL_NAMES[code], *outward(paths.steps[0, 0], start.units.of_step()).tolist()
+            )
+        if code == records.HORIZON:
+            return Horizon(t_end, *outward(paths.ends[0, 2:], start.units.of_step()[2:]).tolist())
     except BadInput as error:  # the answer does not fit into binary64
         return Undecided(str(error))
     return stepper.trouble(code, scene, state)
@@ -105,13 +108,13 @@ def test_one_call_answers_as_separate_checks_do(tally):
 
 def test_a_kernel_that_overlooks_the_wall_is_found(monkeypatch):
     """It takes for free what is not on the wall that it names."""
-    single = stepper.entries.single_at_once()
+    single = stepper.single.single_at_once()
 
     def lenient(*question):
         found = single(*question)
-        return single(*question[:-2], int(codes.NO_WALL), question[-1]) if found[0] == REFUSED else found
+        return single(*question[:-2], int(records.NO_WALL), question[-1]) if found[0] == REFUSED else found
 
-    monkeypatch.setattr(stepper.entries, "single_at_once", lambda: lenient)
+    monkeypatch.setattr(stepper.single, "single_at_once", lambda: lenient)
     monkeypatch.setattr(stepper, "latest", [None])
     assert differing(1, 300)
 

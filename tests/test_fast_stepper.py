@@ -15,10 +15,10 @@ import fast
 import reference
 from conformance.grading.agreement import compare
 from fast.batch import lane_steps
-from fast.compiled import compile_scene
 from fast.kernel import arithmetic
 from fast.kernel.laws import increment, set_anchors
 from fast.kernel.records import ANCHORS_SHAPE, DEPTH, VALUE
+from fast.units import compile_scene
 from scene import BangBang, Cap, Collision, Fourier, Horizon, Mushroom, State, Undecided, Undefined, load
 from scene.laws import value
 from scene.tables import laws

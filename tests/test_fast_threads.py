@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import fast
-from fast.kernel import entries
+from fast import ensemble, paths
+from fast.kernel.one_path import PATHS
 from fast.threads import LONG, follow_path
 from scene import State, load
 
@@ -57,11 +58,11 @@ def test_an_interrupt_is_heeded_in_the_middle_of_a_path(begun, monkeypatch, call
 
         return watching
 
-    for name, place in (("follow_particles", 1), ("fine", 2)):
-        watching = watched(getattr(entries, name), lambda given, place=place: len(given[place]))
-        monkeypatch.setattr(entries, name, watching)
-    for key, kernel in entries.PATHS.items():
-        monkeypatch.setitem(entries.PATHS, key, watched(kernel, lambda given: len(given[1])))
+    for module, name, place in ((ensemble, "follow_particles", 1), (paths, "fine_path", 2)):
+        watching = watched(getattr(module, name), lambda given, place=place: len(given[place]))
+        monkeypatch.setattr(module, name, watching)
+    for key, kernel in PATHS.items():
+        monkeypatch.setitem(PATHS, key, watched(kernel, lambda given: len(given[1])))
     quick = State(0.0, 0.1, 0.2, 3e7, 4e7)  # a second or more, where nobody interrupts
     with pytest.raises(KeyboardInterrupt):
         {

@@ -19,9 +19,8 @@ from support.truth import proved_step
 import fast
 from conformance.grading.agreement import compare
 from fast import step as stepper
-from fast.compiled import compile_scene
-from fast.kernel.single import packed
-from fast.units import Fitted, outward
+from fast.kernel.single import pack_scene
+from fast.units import Fitted, compile_scene, outward
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, Undecided, load
 from scene.refusal import BadInput
 from scene.transforms import scaled
@@ -41,10 +40,10 @@ def test_the_search_sees_a_stepper_that_does_not_scale(monkeypatch, tally):
 
     def unfitted(scene):
         compiled = compile_scene(scene)
-        return Fitted(scene, 0, 0, compiled, packed(compiled, 0, 0))
+        return Fitted(scene, 0, 0, compiled, pack_scene(compiled, 0, 0))
 
     monkeypatch.setattr(stepper, "fit", unfitted)
-    monkeypatch.setattr(import_module("fast.flow"), "fit", unfitted)
+    monkeypatch.setattr(import_module("fast.flows"), "fit", unfitted)
     with np.errstate(all="ignore"):
         tally["wrong"] = len(search(4, 60, tally))
         assert tally["wrong"] > 5

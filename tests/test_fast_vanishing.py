@@ -20,7 +20,7 @@ from conformance.cases.delicate_families import sunk
 from conformance.cases.prover import proved_step
 from conformance.cases.table import FAMILIES
 from fast.batch import lane_steps
-from fast.kernel.pieces import law_at
+from fast.kernel.lane_laws import law_at
 from fast.kernel.records import DEPTH
 from fast.pieces import laws_in_lanes
 from scene import Fourier, Horizon, Mushroom, State, Stem

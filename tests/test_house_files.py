@@ -33,8 +33,7 @@ MAX_STATEMENTS = {
 MAX_ARGUMENTS = 8  # of a kernel: what belongs together is a record
 # Python hands these a state number by number; a record would take longer than the step.
 CROWDED = {
-    "fast/kernel/entries.py: single",
-    "fast/kernel/single.py: single_step",
+    "fast/kernel/single.py: single",
     "fast/kernel/single.py: question",
 }
 # Complete in themselves, as examples for other people's steppers: their classes may have our names.

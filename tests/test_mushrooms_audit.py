@@ -234,7 +234,7 @@ def test_what_other_sources_found_is_found_again(call, tmp_path, monkeypatch):
         "audit/claims/printed.py",
         "audit/claims.toml",
         "scene/catalogue/moving-cap.toml",
-        "fast/kernel/careful.py",
+        "fast/kernel/scalar_step.py",
         "theory/finite_energy/frozen_rates.json",
     ],
 )

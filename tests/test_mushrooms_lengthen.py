@@ -16,7 +16,7 @@ from support.refusals import assert_refused
 from zarr.storage import LocalStore
 
 import fast
-from fast.kernel import kept, pools
+from fast.kernel import follow, pools
 from mushrooms import compared
 from mushrooms.store import conduct, engines
 from mushrooms.store import run as stored
@@ -165,11 +165,11 @@ def test_a_chunk_holds_the_cycles_that_a_run_began_with(command_line, tmp_path):
 
 def test_what_is_kept_takes_the_room_that_the_page_says():
     shape = shape_of(RunSpec(load("moving-cap"), ENERGY, 1, SEED), 1, 1)
-    assert shape.bytes_of_a_particle == 114 + 8 * kept.LANE_ROWS == 410
+    assert shape.bytes_of_a_particle == 114 + 8 * follow.LANE_ROWS == 410
 
 
 def forgotten(row):
-    column = kept.FIRST_ROW + int(row // pools.STRIDE)
+    column = follow.FIRST_ROW + int(row // pools.STRIDE)
 
     def faulty(arrays, *more):
         lanes = arrays[LANES].copy()

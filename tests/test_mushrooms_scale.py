@@ -22,7 +22,7 @@ from support.depth import deep_but
 from support.refusals import assert_refused
 
 import fast
-from fast.kernel.kept import LANE_ROWS
+from fast.kernel.follow import LANE_ROWS
 from mushrooms.main import run
 from mushrooms.store import engines
 from mushrooms.store.run import DESCRIPTION, GROUP, MARKERS, StoredRun

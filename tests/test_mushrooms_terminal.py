@@ -43,11 +43,6 @@ def test_the_list_of_commands_imports_none_of_them():
     assert "numba" in loaded_by("import fast\nfast.simulate")
 
 
-def test_functions_stand_before_the_modules_that_have_their_names():
-    code = "import fast.flow\nfrom fast.trajectory import Collisions\nassert callable(fast.flow)\n"
-    loaded_by(code + "assert callable(fast.trajectory)\nassert fast.Collisions is Collisions")
-
-
 def test_the_list_of_commands_has_an_example(command_line):
     assert "Example: mushrooms " in command_line("--help").out
 

@@ -34,7 +34,7 @@ import scene as scenes
 from conformance.audit.runs import scene_named
 from conformance.audit.tolerances import FloatArray, Mean, mean
 from conformance.files import write_file
-from fast.flow import carry_judged
+from fast.flows import carry
 from scene import Fourier, Horizon, Mushroom, State
 from scene.geometry import TableAt, table_at
 from scene.laws import value
@@ -160,7 +160,7 @@ def lag(
     now = table_at(fp, scene, t)
     found = passages(scene, now, t, speed, n, random)
     table, share = swaying(scene, t, SWAY_PERIOD * TAIL)
-    done = carry_judged(table, found.states, [None] * len(found.states), TAIL, 1)
+    done = carry(table, found.states, [None] * len(found.states), TAIL, 1)
     ends = [o.vx**2 + o.vy**2 if isinstance(o, Horizon) else math.nan for o in done.outcomes]
     length = found.path + TAIL
     excess = np.log(ends) / share + found.arcs * now.r_rate - kick_rate(scene, t) * length

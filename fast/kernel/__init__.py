@@ -1,1 +1,1 @@
-"""What numba compiles: laws, walls, the careful step, the lanes, and the entries that Python calls."""
+"""What numba compiles: laws, walls, the scalar step, the SIMD lanes, and the functions that Python calls."""

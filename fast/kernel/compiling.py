@@ -157,8 +157,7 @@ def caller(signature: Signature) -> Callable[..., Any]:
 
         return signature.return_type(types.int64, types.Tuple(signature.args)), generate
 
-    called: Callable[..., Any] = call
-    return called
+    return call  # type: ignore[no-any-return]
 
 
 # A function of its own, compiled where compiled functions call it. Python, which calls the function as it is

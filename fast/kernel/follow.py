@@ -1,14 +1,20 @@
-"""Following particles to given times: lanes where they are shown right, the careful step elsewhere.
+"""Following particles to given times: lanes where they are shown right, the scalar step elsewhere.
 
 A worker holds LANES particles in two pools: `general` for any collision, and `disk` for captured
 particles, whose base bounces are counted and not stepped; a cap has the disk alone. Every particle's
 numbers depend on that particle only, so threads, chunks and lane positions do not change a bit.
 
 Particles are looked at where their flight passes a *stop*: an instant at which the energy is wanted, a cycle
-ends or the mouth narrows (nu has a local minimum). A captured stay is recorded in the slot of each narrowing
-that it spans, which keeps out the many brief crossings of the edge |sin phi| = nu. A lane cannot hold all
-narrowings, and one is enough: a stay spans some narrowing exactly when it spans the first after its begin.
-SINCE = UNTIL is that one, or the last that has passed while there is none.
+ends or nu has a local minimum. A capture interval is recorded in the slot of each minimum that it spans,
+which keeps out the many brief crossings of the edge |sin phi| = nu. A lane cannot hold all minima, and one is
+enough: an interval spans some minimum exactly when it spans the first after its begin. SINCE = UNTIL is that
+one, or the last that has passed while there is none.
+
+A run can go on with later stops. A last state does not do for that: it lies in the middle of a flight, and a
+flight that begins there is rounded otherwise than the one that passes. Kept is the lane as `attend` meets it,
+before it moves on. Its flight is found again, to the same bits: that depends on the lane alone. The piece of
+the laws is kept by its number and reference time. It is not always the one that serves at the lane's time: a
+flight that ran out of its piece was given another in mid-flight.
 """
 
 from __future__ import annotations
@@ -17,20 +23,56 @@ import numpy as np
 
 from fast.kernel.arithmetic import fma
 from fast.kernel.bounces import captured, count_hit, spin_in_disk, stay_after
-from fast.kernel.codes import ANEW, ARC, HORIZON, N_WALLS, TOO_FAR
-from fast.kernel.compiling import kernel, part
-from fast.kernel.judged import KNOWN
-from fast.kernel.kept import keep_lane, take_lane
-from fast.kernel.lane_laws import know_laws, set_reference
-from fast.kernel.loops import run_careful, run_step
+from fast.kernel.compiling import HOW, kept, kernel, part
+from fast.kernel.lane_laws import know_laws, set_piece, set_reference
 
 from fast.kernel.pools import (  # isort: skip
-    AS_GIVEN, END, FAR, FATE, LANES, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, ON_ARC, S,
-    SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, TRIES, T_LOW, UNTIL, VX, VY, WALL, WHEN, X, Y,
-    change_lane, load, refold, whole_registers,
+    AS_GIVEN, END, FAR, FATE, LANES, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, N_ROWS,
+    ON_ARC, PIECE, R1, REF, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, TRIES, T_LOW, UNTIL, VX, VY,
+    W0_LOW, WALL, WHEN, X, Y, change_lane, load, particle_of, put_particle, refold, whole_registers,
 )  # fmt: skip
-from fast.kernel.records import RADIUS, VALUE, WIDTH, Particle, particle_at, write_state
-from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
+from fast.kernel.records import (  # isort: skip
+    ANEW, ARC, HORIZON, N_WALLS, RADIUS, TOO_FAR, VALUE, WIDTH, Particle, particle_at, write_state,
+)  # fmt: skip
+from fast.kernel.scalar_step import KNOWN
+from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE, run_careful, run_step
+
+# Columns of what is kept: the pool, the number of the next stop, careful steps so far, whether the lanes know
+# the laws; then the rows of the pool up to W0_LOW.
+POOL, NEXT, CAREFUL, IS_KNOWN = np.arange(4)
+FIRST_ROW = 4
+LANE_ROWS = FIRST_ROW + int(W0_LOW // STRIDE)
+
+
+@kernel
+def keep_lane(pool, a, i, roster, is_known, worker):
+    """Keep a lane as it is before it is attended to; of its laws what its form has."""
+    j, followed = roster[PARTICLE, i], worker.followed
+    out = followed.lanes[j]
+    out[:] = 0.0
+    out[POOL], out[NEXT], out[CAREFUL] = pool, roster[NEXT_STOP, i], followed.careful[j]
+    out[IS_KNOWN] = 1.0 if is_known else 0.0
+    last = REF if not is_known else (R1 + STRIDE if worker.degree % 2 == 1 else W0_LOW)
+    for k in range(last // STRIDE):
+        out[FIRST_ROW + k] = a[k * STRIDE + i]
+
+
+@kernel
+def take_lane(a, i, roster, j, worker):
+    """Put a kept particle into a lane, before it is attended to."""
+    kept = worker.followed.lanes[j]
+    for row in range(N_ROWS):
+        a[row * STRIDE + i] = 0.0
+    roster[PARTICLE, i], roster[NEXT_STOP, i] = j, int(kept[NEXT])
+    worker.followed.careful[j] = int(kept[CAREFUL])
+    for k in range(W0_LOW // STRIDE):
+        a[k * STRIDE + i] = kept[FIRST_ROW + k]
+    a[WHEN + i], a[STOP + i], a[END + i] = NEVER, -NEVER, -NEVER
+    if kept[IS_KNOWN] > 0.0 and worker.degree % 2 == 0:
+        set_piece(a, i, int(a[PIECE + i]), worker.scene, worker.pieces, worker.degree)
+    elif kept[IS_KNOWN] > 0.0:
+        a[END + i] = NEVER
+
 
 STAYS, MOVES, ENDS = 0, 1, 2
 
@@ -122,9 +164,8 @@ def set_stop(a, i, since, roster, worker):
 @kernel
 def careful_flight(a, i, worker):
     """Find a lane's next collision carefully; returns what `careful_step` does."""
-    t, t_low = a[T + i], a[T_LOW + i]
-    p = Particle(t, t_low, a[X + i], a[Y + i], a[VX + i], a[VY + i], int(a[WALL + i]))
-    limit = (worker.stops.times[-1] - t) - t_low
+    p = particle_of(a, i)
+    limit = (worker.stops.times[-1] - p.t) - p.t_low
     return run_careful(worker.loops.careful, (p, limit, KNOWN, worker.scene, worker.anchors))
 
 
@@ -144,7 +185,7 @@ def land_carefully(pool, a, i, code, s, p, worker):
     if pool == DISK:
         a[SPIN + i] = p.x * p.vy - p.y * p.vx
     count_hit(a, i, hit, 1.0)
-    a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i] = p.t, p.t_low, p.x, p.y, p.vx, p.vy
+    put_particle(a, i, p)
     a[WALL + i], a[S + i], a[TRIES + i] = hit, s, 0.0
     if worker.is_laned:
         know_laws(a, i, 0.0, scene, worker.pieces, worker.degree, worker.waves)
@@ -164,7 +205,8 @@ def step_carefully(pool, a, i, roster, worker):
         followed.careful[roster[PARTICLE, i]] += 1
         if code > HORIZON:
             return code
-        note_stops(a, i, roster, p.t, stops, followed)
+        # Rounded, the time at the horizon may be before it.
+        note_stops(a, i, roster, stops.times[-1] if code == HORIZON else p.t, stops, followed)
         if code == HORIZON or roster[NEXT_STOP, i] == stops.times.shape[0]:
             return np.int64(HORIZON)
         land_carefully(pool, a, i, code, s, p, worker)
@@ -313,9 +355,9 @@ def take_in(worker, j, wall):
     n_held[home] += 1
 
 
-@kernel
-def follow(worker, walls):
-    """Follow particles to the last stop.
+@kept(nogil=True, **HOW)
+def follow_particles(worker, walls):
+    """Follow particles to the last stop. Threads may call it side by side.
 
     Args:
         worker: it holds no particle yet; its `followed.states` are the particles' starts, or are not looked

@@ -5,8 +5,8 @@ time; `fly` corrects that once, and checks; `bounce` (fast.kernel.bounces) refle
 the same for captured particles, unfolded through the base. A lane whose step is not shown right by the checks
 is left to the careful step (fast.kernel.follow).
 
-Laws. Every law is a short polynomial about the lane's reference time, whatever its kind: fast.kernel.pieces.
-A slope that stands still is passed as `slope`; where that is None the slope moves, and its rows are read.
+Laws. A lane knows them in one of two forms: fast.kernel.lane_laws. A slope that stands still is passed as
+`slope`; where that is None the slope moves, and its rows are read.
 
 What a lane's step claims, and which inequality in which line carries it, for every kind of flight and every
 wall on it, rounding included: docs/lanes.md. In short: Newton leaves less than 2^-57 of the time;

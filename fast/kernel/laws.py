@@ -24,13 +24,14 @@ from fast.kernel.arithmetic import (
     SAFETY,
     TWO_OVER_PI,
     beyond_first_order,
+    fine_sine_cosine,
+    mul,
     sine_cosine,
+    times,
     two_product,
     two_sum,
 )
 from fast.kernel.compiling import kernel, part
-from fast.kernel.double_double import mul, times
-from fast.kernel.double_double import sine_cosine as fine_sine_cosine
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, BANG_BANG, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, IS_SHORT, KIND, KNOTS, LEVEL,
@@ -197,6 +198,20 @@ def whole_periods(first, period, period_low, t_hi, t_lo):
 
 
 @kernel
+def leg_at(laws, row, t_hi, t_lo):
+    """Return the number of the leg that a bang-bang law is in, and how many whole periods have gone by."""
+    period, period_low = laws[row, PERIOD], laws[row, PERIOD_LOW]
+    n_periods, _ = whole_periods(laws[row, KNOTS], period, period_low, t_hi, t_lo)
+    i = 0
+    while i < int(laws[row, N_KNOTS]) - 2:
+        since_next, _ = time_since(laws[row, KNOTS + i + 1], n_periods, period, period_low, t_hi, t_lo)
+        if since_next < 0.0:
+            break
+        i += 1
+    return i, n_periods
+
+
+@kernel
 def on_parabola(value, a, a_low, u, u_low):
     """Return value + a u^2 / 2 as a sum of two floats, and a u."""
     p, p_low = two_product(u, u)
@@ -210,16 +225,9 @@ def set_leg(laws, anchors, row, t_hi, t_lo):
     """Anchor a bang-bang law: its nearer knot gives value and derivative without cancellation."""
     n = int(laws[row, N_KNOTS])
     period, period_low = laws[row, PERIOD], laws[row, PERIOD_LOW]
-    first = laws[row, KNOTS]
-    n_periods, _ = whole_periods(first, period, period_low, t_hi, t_lo)
+    i, n_periods = leg_at(laws, row, t_hi, t_lo)
     if not abs(n_periods) < MAX_QUADRANT:
         return False
-    i = 0
-    while i < n - 2:
-        since_next, _ = time_since(laws[row, KNOTS + i + 1], n_periods, period, period_low, t_hi, t_lo)
-        if since_next < 0.0:
-            break
-        i += 1
     before, after = laws[row, KNOTS + i], laws[row, KNOTS + i + 1]
     length, length_low = two_sum(after, -before)
     a, a_low = laws[row, KNOTS + 2 * n + i], laws[row, KNOTS + 3 * n + i]

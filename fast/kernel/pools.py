@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fast.kernel.codes import ARC, BASE, FLOOR, LEFT, RIGHT
 from fast.kernel.compiling import kernel, part
+from fast.kernel.records import ARC, BASE, FLOOR, LEFT, RIGHT, Particle
 
 LANES = 128
 # How far rows are apart. Were it a divisor of 4096 bytes, rows would meet in few sets of the cache, and a
@@ -34,7 +34,7 @@ NEVER = np.inf
     BEFORE, MEAN_RATE,
     LAWS,  # from here on the coefficients of a piece: see Pieces.coefficients
 ) = STRIDE * np.arange(62)  # fmt: skip
-SINE, COSINE = R0, R1
+PHASE_SINE, PHASE_COSINE = R0, R1
 N_COEFFICIENTS = 16  # of each law, as many as the highest degree asks for
 N_ROWS = 61 + 4 * N_COEFFICIENTS
 RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * np.arange(4)
@@ -63,8 +63,7 @@ def load(a, i, particle, is_first_kept):
     """Put a particle into a lane; its laws are unknown there, so its first step will be careful."""
     for row in range(N_ROWS):
         a[row * STRIDE + i] = 0.0
-    a[T + i], a[T_LOW + i] = particle.t, particle.t_low
-    a[X + i], a[Y + i], a[VX + i], a[VY + i] = particle.x, particle.y, particle.vx, particle.vy
+    put_particle(a, i, particle)
     a[WALL + i] = particle.wall
     a[AS_GIVEN + i] = 1.0 if particle.wall == ARC else 0.0
     # Any stay serves, or none until the mouth has narrowed.
@@ -72,6 +71,18 @@ def load(a, i, particle, is_first_kept):
     a[SINCE + i], a[UNTIL + i] = any_serves, -any_serves
     a[STAY_IN + i] = a[STAY_OUT + i] = a[WHEN + i] = NEVER
     a[STOP + i] = a[END + i] = -NEVER
+
+
+@part
+def particle_of(a, i):
+    """Return a lane's particle."""
+    return Particle(a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i], int(a[WALL + i]))
+
+
+@part
+def put_particle(a, i, p):
+    """Write a particle's state into a lane, but for its wall."""
+    a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i] = p.t, p.t_low, p.x, p.y, p.vx, p.vy
 
 
 @kernel

@@ -1,7 +1,8 @@
 """What kernels are given and hand back, and the names of the columns of their tables of numbers.
 
 numba reads a named tuple as cheaply as loose arguments. The numbers of all laws are rows of one array,
-because a row is chosen while a kernel runs; its columns are named here and nowhere else.
+because a row is chosen while a kernel runs; its columns are named here and nowhere else. Walls, outcomes and
+tables are numpy integers, because numba compiles a function anew for each Python integer passed to it.
 """
 
 from __future__ import annotations
@@ -11,10 +12,20 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast.kernel.codes import N_WALLS, NO_WALL
 from fast.kernel.compiling import kernel
 
-FloatArray = npt.NDArray[np.floating[Any]]
+NO_WALL, ARC, BASE, LEFT, RIGHT, FLOOR = np.arange(-1, 5)
+N_WALLS = 5
+HORIZON, SLIDING, MOUTH_EDGE, ON_CORNER = np.array([10, 20, 21, 22])
+FAR_TIME, TOO_MANY, TANGENT, CORNER, EDGE, START, AT_END, TOO_FAR = np.arange(31, 39)
+# A refused state moves into the wall that it leaves, or lies beyond a wall: BEYOND plus that wall's code; or
+# it is off the wall that it names. ANEW is no end: a particle that cannot go on from where it was kept, and
+# is to be followed from its start.
+APPROACHING, BEYOND, ANEW, OFF_WALL = np.array([40, 41, 50, 52])
+CAP, STEM, MUSHROOM = np.arange(3)
+
+
+FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
@@ -132,7 +143,7 @@ class LawsInLanes(NamedTuple):
     Attributes:
         compiled: the scene's numbers.
         pieces: its laws as polynomials; of waves their period alone, and up to when they are known.
-        degree: of the polynomials, PARABOLA or SERIES of fast.kernel.pieces; or ONE_WAVE or TWO_WAVES.
+        degree: of the polynomials, PARABOLA or SERIES of fast.kernel.lane_laws; or ONE_WAVE or TWO_WAVES.
         slope: of the sides; None where it moves.
         waves: its laws as waves.
     """
@@ -176,7 +187,8 @@ class Paths(NamedTuple):
 
     Attributes:
         steps: (N, K, 6) dt, t, x, y, vx, vy after each collision, times `factors`.
-        factors: (2, 6) powers of two by which steps are multiplied, and their inverses.
+        factors: (4, 6) two powers of two by which steps are multiplied, and their inverses: one alone may
+            be none of the floats.
         n_exact: (N,) how many steps lost no bit by that, before the first that did.
         walls: (N, K) codes of the walls hit.
         counts: (N,) how many collisions there are.
@@ -193,12 +205,13 @@ class Paths(NamedTuple):
     ends: FloatArray
 
 
-def unfilled_paths(n_starts: int, n_collisions: int, factors: FloatArray | None = None) -> Paths:
-    """Return what is to be filled in for paths from some starts; steps times factors (6,), if any."""
-    by = np.ones(6) if factors is None else factors
+def unfilled_paths(n_starts: int, n_collisions: int, exponents: IntArray | None = None) -> Paths:
+    """Return what is to be filled in for paths from some starts; steps times 2^exponents (6,), if any."""
+    by = np.zeros(6, np.int64) if exponents is None else exponents
+    halves = np.stack([by // 2, by - by // 2])
     return Paths(
         np.empty((n_starts, n_collisions, 6)),
-        np.stack([by, 1.0 / by]),
+        np.ldexp(1.0, np.vstack([halves, -halves])),
         np.full(n_starts, n_collisions, np.int64),
         np.empty((n_starts, n_collisions), np.int64),
         np.zeros(n_starts, np.int64),
@@ -244,7 +257,7 @@ class Followed(NamedTuple):
             stem has been met since.
         t_in, t_out: (N, K, M) the captured stays that are kept; nan for none.
         lanes: (N, LANE_ROWS) what goes on from the last stop, nan for who ended before it: see
-            fast.kernel.kept; (N, 0) where nobody asks for it.
+            fast.kernel.follow; (N, 0) where nobody asks for it.
     """
 
     states: FloatArray
@@ -301,9 +314,9 @@ def write_step(paths, i, k, dt, particle):
     is_exact = True
     for column in range(6):
         number = numbers[column]
-        scaled = number * paths.factors[0, column]
+        scaled = number * paths.factors[0, column] * paths.factors[1, column]
         paths.steps[i, k, column] = scaled
-        is_exact = is_exact and scaled * paths.factors[1, column] == number
+        is_exact = is_exact and scaled * paths.factors[2, column] * paths.factors[3, column] == number
     if not is_exact:
         paths.n_exact[i] = min(paths.n_exact[i], k)
 

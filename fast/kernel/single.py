@@ -1,24 +1,24 @@
-"""One careful step of one particle, from numbers to numbers: most of what one question costs is around it.
+"""One question: a scalar step of one particle, from numbers to numbers.
 
-Units are changed here and not in Python, the scene is one array and the answer a tuple. Nothing is kept
-between calls, so that threads may ask side by side. What is refused here is refused by the checks in Python
-too, which say why.
+Most of what a question costs is around the step. So units are changed here and not in Python, the scene is
+one array and the answer a tuple. Nothing is kept between calls, so that threads may ask side by side. What is
+refused here is refused by the checks in Python too, which say why.
 """
 
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
-from numba import config
+from numba import config, types
 
-from fast.kernel.codes import HORIZON, OFF_WALL
-from fast.kernel.compiling import kernel, part
-from fast.kernel.judged import GIVEN
-from fast.kernel.loops import run_careful
-from fast.kernel.records import ANCHORS_SHAPE, SHARED, Compiled, Particle
+from fast.kernel.compiling import kept, kernel, part
+from fast.kernel.records import ANCHORS_SHAPE, HORIZON, OFF_WALL, SHARED, Compiled, Particle
+from fast.kernel.scalar_step import GIVEN
+from fast.kernel.worker import run_careful
 
-# Beside those of fast.kernel.codes: the question is no good, and the answer does not fit into binary64.
+# Beside those of fast.kernel.records: the question is no good, and the answer does not fit into binary64.
 REFUSED, ANSWER_LOST = np.array([53, 54])
 # Squares of what is larger overflow.
 LARGEST = 2.0**400
@@ -37,7 +37,7 @@ def _plain_ldexp(number, exponent):
 ldexp = _plain_ldexp if config.DISABLE_JIT else math.ldexp
 
 
-def packed(scene, length, time):
+def pack_scene(scene, length, time):
     """Return a Compiled and its units as one array of floats; see fast.units.
 
     Every argument more costs a call some twentieth of a microsecond.
@@ -48,7 +48,7 @@ def packed(scene, length, time):
 
 
 @part
-def unpacked(numbers):
+def unpack_scene(numbers):
     """Return the Compiled that `packed` was given."""
     bounds, laws = numbers[4:20].reshape((4, 4)), numbers[20:]
     return Compiled(
@@ -110,8 +110,8 @@ def answer(length, time, code, dt, particle):
     return code, dt_out, t_out, x_out, y_out, vx_out, vy_out
 
 
-@part
-def single_step(step_at, numbers, t, x, y, vx, vy, wall, t_end):
+@kept(error_model="numpy")
+def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
     """Take a careful step, whose address is given, in a packed scene.
 
     Returns:
@@ -123,8 +123,34 @@ def single_step(step_at, numbers, t, x, y, vx, vy, wall, t_end):
     is_good, particle, end = question(length, time, t, x, y, vx, vy, wall, t_end)
     if not is_good:
         return REFUSED, 0.0, t, x, y, vx, vy
-    known = particle, end - particle.t, GIVEN, unpacked(numbers), np.zeros(ANCHORS_SHAPE)
+    known = particle, end - particle.t, GIVEN, unpack_scene(numbers), np.zeros(ANCHORS_SHAPE)
     code, dt, particle = run_careful(step_at, known)
     if code > HORIZON:
         return (REFUSED if code == OFF_WALL else code), 0.0, t, x, y, vx, vy
     return answer(length, time, code, dt, particle)
+
+
+@kept(error_model="numpy")
+def off_wall(step_at, scene, particle):
+    """Return the share of its wall's size by which a particle is off it; 0 for one on it.
+
+    And for one at a time whose phase is lost: that is left to the step, which refuses it.
+    """
+    code, share, _ = run_careful(step_at, (particle, 0.0, GIVEN, scene, np.zeros(ANCHORS_SHAPE)))
+    return share if code == OFF_WALL else 0.0
+
+
+NUMBERS, REAL, WHOLE = types.float64[::1], types.float64, types.int64
+SINGLE = (WHOLE, NUMBERS, REAL, REAL, REAL, REAL, REAL, WHOLE, REAL)
+
+
+@cache
+def single_at_once():
+    """Return `single` for arguments that are known to be of the right types: they are not looked at again.
+
+    To find out what each of nine arguments is takes numba a tenth of the time of a whole question.
+    """
+    if config.DISABLE_JIT:
+        return single
+    single.compile(SINGLE)
+    return single.overloads[SINGLE].entry_point

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from fast.kernel.arithmetic import SAFETY, dot, fma, multiplied, products, quotient, two_product, two_sum
-from fast.kernel.codes import ARC, BASE, CAP, FLOOR, LEFT, MUSHROOM, NO_WALL, RIGHT, STEM
 from fast.kernel.compiling import kernel, packed, part
 from fast.kernel.laws import increment, rest, width
+from fast.kernel.records import ARC, BASE, CAP, FLOOR, LEFT, MUSHROOM, NO_WALL, RIGHT, STEM
 
 from fast.kernel.records import (  # isort: skip
     BEND, DEPTH, FASTEST, HIGHEST, LOWEST, RADIUS, RATE, SLOPE, VALUE, VALUE_LOW, WIDTH,

@@ -1,20 +1,150 @@
-"""What a thread holds while it follows particles: the scene, its pools, and what it fills in."""
+"""What a thread holds while it follows particles: the scene, its pools, and the loops over lanes.
+
+The loops and the scalar step are compiled each by itself and called by address. numba compiles all that a
+function calls into it, again for every caller: a run needs one of eight loops `fly` (by the form of the laws,
+and whether the slope stands still), and each caller of the scalar step would hold another copy of it. So
+these are compiled once, kept on disk, and called as C calls a function pointer; that costs some nanoseconds
+for a pool of lanes. numba converts arguments to the signature that the caller names; `address` checks that
+the callee has it, too.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import config, typeof, types
+from numba.core.typing import Signature
+from numba.core.typing import signature as returns
 
-from fast.kernel.codes import CAP, MUSHROOM, STEM
-from fast.kernel.limits import LawLimits, limits_of
-from fast.kernel.loops import Loops, loops_of
+from fast.kernel.arithmetic import SAFETY
+from fast.kernel.compiling import HOW, caller, kept
+from fast.kernel.lane_laws import DEGREES, NO_WAVES, ONE_WAVE, TWO_WAVES
+from fast.kernel.lanes import chord, fly
 from fast.kernel.pools import LANES, POOL_SIZE
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawsInLanes, Pieces, Stops,
-    TableOfLanes, LaneWaves,
+    ANCHORS_SHAPE, BEND, CAP, DEPTH, FASTEST, HIGHEST, LOWEST, MUSHROOM, RADIUS, SLOPE, STEM, WIDTH,
+    Compiled, FloatArray, Followed, IntArray, LaneWaves, LawsInLanes, Particle, Pieces, Stops, TableOfLanes,
 )  # fmt: skip
+from fast.kernel.scalar_step import scalar_step
+
+LEAST_RADIUS = 2.0**-1000
+
+
+class LawLimits(NamedTuple):
+    """What holds of a scene's laws for all time, for the lanes' checks.
+
+    Attributes:
+        bend: at least |r'^2 + r r''|: half of what the arc's function may curve upwards, speed left out.
+        curvature: at least |w''| + |m''| h and |h''|, for a slope m.
+        turning: at least 2 |m'|, which comes times |vy| to a side's curvature.
+        rate: at least |r'|, |w'| + |m'| h and |h'|.
+        arc_rate: at least |r'|.
+        size: at least r + w + (1 + |m|) h, which bounds the terms that a wall's function is summed of.
+        lean: at least 1 + |m|.
+        least_r, least_h: at most the least radius and depth. Where a bound says no more than that the
+            radius is positive it is LEAST_RADIUS, with which only concave arcs pass.
+    """
+
+    bend: float
+    curvature: float
+    turning: float
+    rate: float
+    arc_rate: float
+    size: float
+    lean: float
+    least_r: float
+    least_h: float
+
+
+def limits_of(scene: Compiled) -> LawLimits:
+    """Return the limits of a scene's laws."""
+    r, w, h, m = (scene.bounds[row] for row in (RADIUS, WIDTH, DEPTH, SLOPE))
+    grow = 1.0 + SAFETY
+    lean = 1.0 + max(abs(m[LOWEST]), abs(m[HIGHEST]))
+    found = (
+        grow * (r[HIGHEST] * r[BEND] + r[FASTEST] * r[FASTEST]),
+        grow * max(w[BEND] + m[BEND] * h[HIGHEST], h[BEND]),
+        2.0 * m[FASTEST],
+        grow * max(r[FASTEST], w[FASTEST] + m[FASTEST] * h[HIGHEST], h[FASTEST]),
+        grow * r[FASTEST],
+        grow * (r[HIGHEST] + w[HIGHEST] + lean * h[HIGHEST]),
+        grow * lean,
+        max(r[LOWEST], LEAST_RADIUS),
+        max(h[LOWEST], 0.0),
+    )
+    return LawLimits(*map(float, found))
+
+
+# What the loops and the scalar step take and return, by samples.
+_PARTICLE, _TABLE = Particle(*(0.0,) * 6, 0), np.zeros((1, 1))
+_LOOP_TAKES = (np.zeros(1), 0, TableOfLanes(*(False,) * 4), NO_WAVES, 0.0, LawLimits(*(0.0,) * 9))
+STEP = returns(types.none, *map(typeof, _LOOP_TAKES))
+_STEP_TAKES = (_PARTICLE, 0.0, 0, Compiled(0, False, _TABLE, _TABLE), _TABLE)
+CAREFUL = returns(typeof((0, 0.0, _PARTICLE)), *map(typeof, _STEP_TAKES))
+
+run_step, run_careful = caller(STEP), caller(CAREFUL)
+
+
+class Loops(NamedTuple):
+    """Addresses of the compiled loops that serve a scene; without the compiler, the functions themselves.
+
+    Attributes:
+        careful: the careful step.
+        fly: a step of each lane.
+        chord: the same for captured particles.
+    """
+
+    careful: int
+    fly: int
+    chord: int
+
+
+def _loop(step, is_slope_moving, form):
+    terms, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
+
+    @kept(step.__name__, is_slope_moving, form, **HOW)
+    def loop(a, n, table, waves, slope, limits):
+        """Take a step of each lane: see fast.kernel.lanes."""
+        step(a, n, table, waves if is_waves else None, None if is_slope_moving else slope, terms, limits)
+
+    return loop
+
+
+# By the form of the laws, and whether the slope moves: a chord does not meet the sides.
+FORMS = (ONE_WAVE, TWO_WAVES, *DEGREES)
+FLIES = {(moves, form): _loop(fly, moves, form) for moves in (False, True) for form in FORMS}
+CHORDS = {form: _loop(chord, False, form) for form in FORMS}
+
+
+def address(entry: Any, signature: Signature) -> Any:
+    """Compile an entry, or load it from the disk cache, and return its address.
+
+    Raises:
+        TypeError: what it returns is not what the signature says.
+    """
+    if config.DISABLE_JIT:
+        return entry
+    entry.compile(signature.args)
+    found = entry.overloads[signature.args]
+    if found.signature.return_type != signature.return_type:
+        raise TypeError(f"{entry.py_func.__name__} returns {found.signature.return_type}")
+    return found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+
+
+@cache
+def careful_at() -> Any:
+    """Compile the careful step, or load it, and return its address."""
+    return address(scalar_step, CAREFUL)
+
+
+@cache
+def loops_for(is_slope_moving: bool, form: int) -> Loops:
+    """Compile the loops for scenes of such a slope and laws of such a form, or load them."""
+    return Loops(careful_at(), address(FLIES[is_slope_moving, form], STEP), address(CHORDS[form], STEP))
+
 
 CACHE_LINE = 64  # bytes
 GENERAL, DISK = np.arange(2)  # pools
@@ -29,7 +159,7 @@ class Worker(NamedTuple):
         scene, limits: the scene, and what holds of it for all time.
         table: of which kind it is, for the lanes.
         pieces, waves, degree: its laws as the lanes know them.
-        slope, is_slope_moving: of the sides, where it stands still; whether it moves.
+        slope: of the sides, where it stands still.
         loops: the compiled loops for laws of this degree and such a slope.
         anchors: room for its laws at one time.
         is_laned: the lanes may be used.
@@ -48,7 +178,6 @@ class Worker(NamedTuple):
     waves: LaneWaves
     degree: int
     slope: float
-    is_slope_moving: bool
     loops: Loops
     anchors: FloatArray
     is_laned: bool
@@ -66,12 +195,6 @@ def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
     return until > 0.0 and (abs(last) < until or last == np.inf)
 
 
-def table_of(scene: Compiled) -> TableOfLanes:
-    """Return what kind of table a scene is."""
-    kind = scene.table
-    return TableOfLanes(kind == int(STEM), kind == int(MUSHROOM), kind == int(CAP), bool(scene.is_relative))
-
-
 def new_pools() -> FloatArray:
     """Return (2, POOL_SIZE) empty pools that begin with a cache line, as then do all their rows.
 
@@ -87,16 +210,17 @@ def new_worker(
     in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed: int = 0, loops: Loops | None = None
 ) -> Worker:
     """Return a worker that holds no particle yet; with its scene's loops, or the given ones."""
+    scene = in_lanes.compiled
+    is_stem, is_mushroom, is_cap = (scene.table == int(kind) for kind in (STEM, MUSHROOM, CAP))
     return Worker(
-        in_lanes.compiled,
-        limits_of(in_lanes.compiled),
-        table_of(in_lanes.compiled),
+        scene,
+        limits_of(scene),
+        TableOfLanes(is_stem, is_mushroom, is_cap, bool(scene.is_relative)),
         in_lanes.pieces,
         in_lanes.waves,
         in_lanes.degree,
         0.0 if in_lanes.slope is None else in_lanes.slope,
-        in_lanes.slope is None,
-        loops or loops_of(in_lanes),
+        loops or loops_for(in_lanes.slope is None, in_lanes.degree),
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
         new_pools(),

@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import theory
-from fast.given import given_energy
+from fast.validation import check_energy
 from mushrooms.compared import NO_THEORY, begins_widest, known, predicted
 from mushrooms.figures import style as plots
 from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, FloatArray, new_figure
@@ -123,7 +123,7 @@ def histogram(scene: Scene, energy: float, gains: Gains, n_particles: int | None
         BadInput: `scene` is not a scene, or there are fewer than two particles.
     """
     check_scene(scene)
-    found = known(scene, energy := given_energy(energy))
+    found = known(scene, energy := check_energy(energy))
     bars = gathered(gains, 0.0 if found is None else float(found.peak[1] ** 0.5))
     if found is None:
         figure, axes = new_figure(5.2, 4.2)
@@ -151,7 +151,7 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
         BadInput: `scene` is not a scene, or there are fewer than two particles.
     """
     check_scene(scene)
-    found = known(scene, energy := given_energy(energy))
+    found = known(scene, energy := check_energy(energy))
     bars = gathered(gains)
     figure, (above, below) = new_figure(6.4, 8.4, 2, 1)  # one below the other: legible on a telephone
     cycles = np.arange(len(bars.mean) + 1)

@@ -21,7 +21,7 @@ import numpy.typing as npt
 import mushrooms
 import scene as scenes
 from fast import Ensemble, Paused
-from fast.kernel.kept import LANE_ROWS
+from fast.kernel.follow import LANE_ROWS
 from scene import Mushroom, Scene
 from scene.mouth import narrowings
 

@@ -16,7 +16,7 @@ from mpmath import fp
 
 import fast
 import theory
-from fast.kernel.kept import LANE_ROWS
+from fast.kernel.follow import LANE_ROWS
 
 DIGITS = 12  # of predictions, many more than thousands of particles can tell
 TOGETHER = 4000  # particles drawn at a time

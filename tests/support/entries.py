@@ -5,11 +5,17 @@ from __future__ import annotations
 from numba.core.dispatcher import Dispatcher
 
 from fast import batch
-from fast.kernel import entries, loops
+
+from fast.kernel import (  # isort: skip
+    arithmetic, fine_step, follow, lane_laws, one_path, scalar_step, single, worker,
+)  # fmt: skip
+
+MODULES = (arithmetic, batch, fine_step, follow, lane_laws, one_path, scalar_step, single, worker)
 
 
 def kept_entries() -> list[Dispatcher]:
-    """Return all that modules of ours name, by themselves or in a table."""
-    named = [found for module in (entries, loops, batch) for found in vars(module).values()]
+    """Return all that modules of ours name, by themselves or in a table, each once."""
+    named = [found for module in MODULES for found in vars(module).values()]
     found = named + [entry for table in named if isinstance(table, dict) for entry in table.values()]
-    return [entry for entry in found if isinstance(entry, Dispatcher) and entry.stats.cache_path]
+    entries = [entry for entry in found if isinstance(entry, Dispatcher) and entry.stats.cache_path]
+    return list(dict.fromkeys(entries))

@@ -13,7 +13,7 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 import fast
-from fast.kernel import bounces, lane_laws, pieces, pools
+from fast.kernel import bounces, lane_laws, pools
 from fast.kernel.arithmetic import fma
 from support.from_python import from_python
 
@@ -64,9 +64,9 @@ def faulty_lanes(*changes: str) -> ModuleType:
     module = ModuleType("faulty_lanes")
     for name, source in sources.items():  # the last one's functions replace those that the first imports
         exec(compile(source, name, "exec"), module.__dict__)
-    for name, found in (vars(pieces) | vars(pools)).items():
+    for name, found in vars(pools).items():
         vars(module).setdefault(name, found)
-    names = [each.__name__ for each in (module, bounces, lane_laws, pools, pieces)]
+    names = [each.__name__ for each in (module, bounces, lane_laws, pools)]
     for name, found in list(vars(module).items()):
         function = found.py_func if isinstance(found, Dispatcher) else found
         place = getattr(function, "__module__", None)

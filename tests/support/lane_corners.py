@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from fast.kernel import codes
+from fast.kernel import records
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
 from scene.laws import value
 
@@ -43,7 +43,7 @@ def _along_the_arc(r: Law, n: int, random: np.random.Generator, farthest: float)
         angle = min(10.0 ** random.uniform(-2.5, 0.4), 2.9)
         here, there = _at(r, t), _at(r, t + s)
         x, y = here * np.cos(angle), here * np.sin(angle)
-        starts.append((_state(t, s, x, y, there, _offset(random, farthest)), int(codes.ARC)))
+        starts.append((_state(t, s, x, y, there, _offset(random, farthest)), int(records.ARC)))
     return starts
 
 
@@ -53,10 +53,10 @@ def at_the_edge_of_the_mouth(n: int, random: np.random.Generator) -> tuple[Scene
     starts = []
     for t, s in _times(n, random):
         here, there, off = _at(w, t), _at(w, t + s), _offset(random)
-        y, wall = -float(random.uniform(0.01, 0.95)), codes.LEFT
+        y, wall = -float(random.uniform(0.01, 0.95)), records.LEFT
         x = -(here + lean * y)
         if random.random() < 0.4:
-            y, wall = -1.0, codes.FLOOR
+            y, wall = -1.0, records.FLOOR
             x = random.uniform(-0.9, 0.9) * (here - lean)
         starts.append((_state(t, s, x, y, there + lean * off, off), int(wall)))
     return Mushroom(r=1.0, w=w, h=1.0, slope=lean), starts

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast.kernel import codes
+from fast.kernel import records
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.tables import laws, width_factors
 
@@ -42,18 +42,18 @@ class Group(NamedTuple):
 
 
 GROUPS = {
-    "arc to base": Group(int(codes.ARC), "r", is_mouth_wide=False),
-    "arc to stem": Group(int(codes.ARC), "r"),
-    "base to arc": Group(int(codes.BASE), "r"),
-    "arc to moving mouth": Group(int(codes.ARC), "w"),
-    "side to arc": Group(int(codes.RIGHT), "w"),
-    "side to moving arc": Group(int(codes.LEFT), "r"),
-    "floor to arc": Group(int(codes.FLOOR), "w"),
-    "floor to moving arc": Group(int(codes.FLOOR), "r"),
-    "side under moving floor": Group(int(codes.LEFT), "h"),
-    "rising floor": Group(int(codes.FLOOR), "h"),
-    "captured beside a moving mouth": Group(int(codes.ARC), "w", is_captured=True),
-    "captured under a moving arc": Group(int(codes.ARC), "r", is_mouth_wide=False, is_captured=True),
+    "arc to base": Group(int(records.ARC), "r", is_mouth_wide=False),
+    "arc to stem": Group(int(records.ARC), "r"),
+    "base to arc": Group(int(records.BASE), "r"),
+    "arc to moving mouth": Group(int(records.ARC), "w"),
+    "side to arc": Group(int(records.RIGHT), "w"),
+    "side to moving arc": Group(int(records.LEFT), "r"),
+    "floor to arc": Group(int(records.FLOOR), "w"),
+    "floor to moving arc": Group(int(records.FLOOR), "r"),
+    "side under moving floor": Group(int(records.LEFT), "h"),
+    "rising floor": Group(int(records.FLOOR), "h"),
+    "captured beside a moving mouth": Group(int(records.ARC), "w", is_captured=True),
+    "captured under a moving arc": Group(int(records.ARC), "r", is_mouth_wide=False, is_captured=True),
 }
 
 
@@ -144,7 +144,7 @@ def draw_crowd(scene: Scene, group: Group, random: np.random.Generator) -> Array
             x = edge + (widest - edge) * random.random(n)
             y = np.sqrt(np.maximum((now["r"].f - x) * (now["r"].f + x), 0.0))
             vx, vy = np.zeros(n), -2.0 * y / s
-    elif group.wall == codes.ARC:
+    elif group.wall == records.ARC:
         angle = np.where(
             random.random(n) < 0.5, random.uniform(0, np.pi, n), 10.0 ** random.uniform(-3, 0.4, n)
         )
@@ -155,7 +155,7 @@ def draw_crowd(scene: Scene, group: Group, random: np.random.Generator) -> Array
         if group.moving == "r" and not isinstance(scene, Stem) and random.random() < 0.7:
             widest = then["w"].f if group.is_mouth_wide else then["r"].f
             x, y, vx, vy = slipping(scene.r, t, s, widest, sign, random)
-    elif group.wall == codes.BASE:
+    elif group.wall == records.BASE:
         x, y = sign * (now["w"].f + (now["r"].f - now["w"].f) * inward), np.zeros(n)
         # About as fast as the arc, whose function is then hardly concave, or not.
         speed = np.sqrt(np.abs(now["r"].rate ** 2 + now["r"].f * now["r"].bend)) * 10.0 ** random.uniform(
@@ -163,12 +163,12 @@ def draw_crowd(scene: Scene, group: Group, random: np.random.Generator) -> Array
         )
         turn = np.pi * random.random(n)
         vx, vy = speed * np.cos(turn), speed * np.sin(turn)
-    elif group.wall == codes.FLOOR:
+    elif group.wall == records.FLOOR:
         x, y = sign * now["w"].f * inward, -now["h"].f
         vx = sign * (now["w"].rate + small * random.choice([-1.0, 1.0], n))
         vy = np.where(random.random(n) < 0.7, -y / s, small - now["h"].rate)
     else:
-        side = 1.0 if group.wall == codes.RIGHT else -1.0
+        side = 1.0 if group.wall == records.RIGHT else -1.0
         x, y = side * now["w"].f, -now["h"].f * np.where(random.random(n) < 0.5, random.random(n), inward)
         vx = side * (now["w"].rate - small)
         vy = np.where(random.random(n) < 0.7, -y / s, pace * random.normal(size=n))

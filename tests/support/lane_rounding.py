@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from fast.kernel import codes
+from fast.kernel import records
 from scene import BangBang, Fourier, Law, Mushroom, Scene
 from scene.laws import value
 
@@ -51,7 +51,7 @@ def _start(r: Law, random: np.random.Generator) -> Start:
     out = rate - abs(along) * 10.0 ** random.uniform(-9, -0.3)
     e_x, e_y = float(np.cos(angle)) if off else 0.0, float(np.sin(angle))
     place = (now * e_x, now * e_y, out * e_x - along * e_y, out * e_y + along * e_x)
-    return np.array([t, 0.0, *place]), int(codes.ARC)
+    return np.array([t, 0.0, *place]), int(records.ARC)
 
 
 def up_a_deep_stem(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
@@ -64,7 +64,7 @@ def up_a_deep_stem(n: int, random: np.random.Generator) -> tuple[Scene, list[Sta
         width = 0.95 * (1.0 - swing)
         x, at_mouth = random.uniform(-width, width, 2)
         state = np.array([t, 0.0, x, -depth, speed * (at_mouth - x) / depth, speed])
-        starts.append((state, int(codes.FLOOR)))
+        starts.append((state, int(records.FLOOR)))
     return scene, starts
 
 
@@ -78,9 +78,9 @@ def slow_beside_a_plateau(n: int, random: np.random.Generator) -> tuple[Scene, l
         s = speed * 10.0 ** random.uniform(-3, -1)
         there, rate = float(value(fp, law, t + s)), float(value(fp, law, t + s, 1))
         if is_floor:
-            place, wall = (1.0, (speed + rate) * s - there, -speed * along, -speed - rate), codes.RIGHT
+            place, wall = (1.0, (speed + rate) * s - there, -speed * along, -speed - rate), records.RIGHT
         else:
-            place, wall = (there - (speed + rate) * s, -1.0, speed + rate, speed * along), codes.FLOOR
+            place, wall = (there - (speed + rate) * s, -1.0, speed + rate, speed * along), records.FLOOR
         starts.append((np.array([t, 0.0, *place]), int(wall)))
     return scene, starts
 

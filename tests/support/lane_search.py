@@ -20,9 +20,9 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from fast.batch import LaneRound, as_particle, residual
-from fast.fine import fill_path
-from fast.kernel import codes, lanes, pools
+from fast.batch import LaneRound, as_particle, followed_paths, residual
+from fast.kernel import lanes, pools, records
+from fast.kernel.fine_step import fine_path
 from fast.kernel.records import DEPTH, RATE, FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.laws import value
@@ -61,28 +61,23 @@ class Round(LaneRound):
         self.kernels = kernels
         self.is_cap, self.is_disk = self.is_disk, self.is_disk or is_captured
 
-    def step(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
-        """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
-        if not self.is_disk:
-            return self.fly(n)
-        # A step is judged from its state alone, not from the angular momentum of the stay so far.
-        x, y, vx, vy = (self.row(r, n) for r in (pools.X, pools.Y, pools.VX, pools.VY))
-        self.row(pools.SPIN, n)[:] = x * vy - y * vx
-        return self.skip(n)
-
-    def take(self, pool: np.integer[Any], n: int) -> None:
+    def advance(self, n: int) -> None:
         """Take a step in n lanes; faulty kernels run uncompiled, on a list."""
+        if self.is_disk:
+            # A step is judged from its state alone, not from the angular momentum of the interval so far.
+            x, y, vx, vy = (self.row(r, n) for r in (pools.X, pools.Y, pools.VX, pools.VY))
+            self.row(pools.SPIN, n)[:] = x * vy - y * vx
         if self.kernels is lanes:
-            super().take(pool, n)
+            super().advance(n)
             return
         a = self.pool.tolist()
         with np.errstate(all="ignore"):
-            self.advance(a, n)
+            self.call_loop(a, n)
             for i in range(n):
                 self.correct_lane(a, i)
         self.pool[:] = a
 
-    def advance(self, a: list[float], count: int) -> None:
+    def call_loop(self, a: list[float], count: int) -> None:
         """Call the loop of the kernels that `follow.advance` calls."""
         of, limits, k = self.in_lanes, self.worker.limits, self.kernels
         waves = of.waves if of.degree in (k.ONE_WAVE, k.TWO_WAVES) else None
@@ -98,19 +93,24 @@ class Round(LaneRound):
             if spare[pools.FATE] == pools.FAR:
                 t = spare[pools.T] + spare[pools.S]
                 k.set_reference(spare, 0, t, spare[pools.T_LOW], *known)
-            self.advance(spare, 1)
+            self.call_loop(spare, 1)
         k.copy_rows(spare, 0, a, i, 0, pools.POOL_SIZE)
+
+    def careful_step(self, p: FloatArray, wall: int) -> tuple[int, float, FloatArray]:
+        """Return the scalar step's wall, its time, and the state after, from a state and its wall."""
+        paths = followed_paths(self.compiled, p[None], np.array([wall]), 1, np.inf)
+        return int(paths.codes[0]), float(paths.steps[0, 0, 0]), paths.ends[0]
 
     def careful(self, p: FloatArray, wall: int) -> tuple[int, FloatArray]:
         """Return the careful step's wall and dt, x, y, vx, vy; unfolded, those of the next hit of the arc."""
         q, total, is_folded = p.copy(), 0.0, False
         if self.is_disk and q[3] < 0.0:
             q[3], q[5], is_folded = -q[3], -q[5], True
-        code = codes.NO_WALL
+        code = records.NO_WALL
         for _ in range(2):
             code, dt, q = self.careful_step(q, wall)
             total += dt
-            if not self.is_disk or code != codes.BASE:
+            if not self.is_disk or code != records.BASE:
                 break
             wall, is_folded = int(code), not is_folded
         if is_folded:
@@ -119,7 +119,7 @@ class Round(LaneRound):
 
     def is_floor_met_at_once(self, p: FloatArray) -> bool:
         """Tell whether a start is above the floor by no more than rounding, in pairs of floats, and falls."""
-        f, error = residual(as_particle(p, int(codes.FLOOR)), self.compiled, self.anchors)
+        f, error = residual(as_particle(p, int(records.FLOOR)), self.compiled, self.anchors)
         return bool(0.0 < f <= error and p[5] + self.anchors[DEPTH, RATE] < 0.0)
 
     def ulps(self, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray) -> float | None:
@@ -143,7 +143,8 @@ class Round(LaneRound):
         steps, met = np.zeros((1, 6, 2)), np.zeros(1, dtype=np.int64)
         if is_folded:
             start[[2, 4]] *= -1.0
-        fill_path(self.compiled, start, wall, steps, met)
+        called_off = np.zeros(1, np.int64)
+        fine_path(self.compiled, self.anchors, start, wall, np.inf, steps, met, called_off)
         found = np.delete(steps[0, :, 0], 1)
         if is_folded:
             found[[2, 4]] *= -1.0
@@ -212,10 +213,10 @@ def try_starts(
         for i in np.flatnonzero(is_live):
             p, wall = begun[i]
             code, truth = pool.careful(p, wall)
-            if code == codes.START:  # the careful step cannot tell whether it is inside its walls
+            if code == records.START:  # the careful step cannot tell whether it is inside its walls
                 tally["starts at a corner"] += 1
                 is_live[i] = False
-                if hits[i] != codes.FLOOR and pool.is_floor_met_at_once(p):
+                if hits[i] != records.FLOOR and pool.is_floor_met_at_once(p):
                     found.append(
                         Wrong(scene, p.tolist(), wall, (int(hits[i]), numbers[i].tolist()), (code, []))
                     )
@@ -261,7 +262,7 @@ def error_of(
 def is_valid(pool: Round, p: FloatArray, wall: int) -> bool:
     """Tell whether the careful step takes a start."""
     code, _, _ = pool.careful_step(p, wall)
-    return bool(code < codes.APPROACHING)
+    return bool(code < records.APPROACHING)
 
 
 def state_in(pool: Round, i: int) -> tuple[FloatArray, int]:
@@ -328,7 +329,7 @@ def draw_start(scene: Scene, random: np.random.Generator) -> tuple[FloatArray, i
     along, away = 10.0 ** random.uniform(-3, 1.5, 2) * random.choice([1.0, 1.0, 0.03])
     along *= random.choice([-1.0, 1.0])
     wall = int(random.choice(_walls_of(scene), p=_SHARES[len(_walls_of(scene))]))
-    if wall == codes.ARC:
+    if wall == records.ARC:
         angle = random.uniform(0.0, np.pi) if random.random() < 0.7 else 10.0 ** random.uniform(-3, 0)
         out = rate["r"] - away
         bend = float(value(fp, laws(scene)["r"], t, 2))
@@ -344,24 +345,24 @@ def draw_start(scene: Scene, random: np.random.Generator) -> tuple[FloatArray, i
         place = (now["r"] * e_x, now["r"] * e_y, out * e_x - along * e_y, out * e_y + along * e_x)
         return np.array([t, 0.0, *place]), wall
     w, w_rate = _mouth(scene, t)
-    if wall == codes.BASE:
+    if wall == records.BASE:
         is_top = isinstance(scene, Stem)
         x = w * random.uniform(-1, 1) if is_top else w + (now["r"] - w) * random.random()
         return np.array([t, 0.0, x, 0.0, along, -away if is_top else away]), wall
-    if wall == codes.FLOOR:
+    if wall == records.FLOOR:
         at = (w - now["slope"] * now["h"]) * random.uniform(-1, 1)
         return np.array([t, 0.0, at, -now["h"], along, away - rate["h"]]), wall
     y = -now["h"] * random.random()
-    sign = 1.0 if wall == codes.RIGHT else -1.0
+    sign = 1.0 if wall == records.RIGHT else -1.0
     out = w_rate + rate["slope"] * y + now["slope"] * along - away
     return np.array([t, 0.0, sign * (w + now["slope"] * y), y, sign * out, along]), wall
 
 
 def _walls_of(scene: Scene) -> npt.NDArray[np.int64]:
     if isinstance(scene, Cap):
-        return np.array([codes.ARC])
-    below = [codes.BASE, codes.LEFT, codes.RIGHT, codes.FLOOR]
-    return np.array(below if isinstance(scene, Stem) else [codes.ARC, *below])
+        return np.array([records.ARC])
+    below = [records.BASE, records.LEFT, records.RIGHT, records.FLOOR]
+    return np.array(below if isinstance(scene, Stem) else [records.ARC, *below])
 
 
 _SHARES = {1: [1.0], 4: [0.25] * 4, 5: [0.6, 0.1, 0.1, 0.1, 0.1]}

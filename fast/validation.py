@@ -99,9 +99,9 @@ def check_progress(progress: object) -> Callable[[int], None] | None:
     return progress
 
 
-def check_kept(n_particles: int, n_cycles: int, n_phases: int, n_narrowings: int) -> None:
+def check_kept(n_particles: int, n_cycles: int, n_phases: int, n_minima: int) -> None:
     """Refuse an ensemble whose results would not fit into memory."""
-    kept = n_particles * n_cycles * (n_phases + 1 + 2 * n_narrowings)
+    kept = n_particles * n_cycles * (n_phases + 1 + 2 * n_minima)
     if kept > MAX_KEPT:
         raise BadInput(
             f"n_particles = {n_particles}, n_cycles = {n_cycles} and {n_phases} phases: {kept} energies and"

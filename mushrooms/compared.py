@@ -15,7 +15,7 @@ from mushrooms.store.spec import RunSpec
 from scene import Mushroom, Scene
 from scene.geometry import table_at
 from scene.laws import values
-from scene.mouth import narrowings, start_time
+from scene.mouth import mouth_minima, start_time
 from scene.refusal import BadInput
 from scene.tables import laws
 
@@ -121,7 +121,7 @@ def _measured_error(scene: Scene, share: float, n: int) -> float:
     Of n that are all alike the binomial one would be 0, as if no more could tell: there it is that of a share
     of 1 / (n + 1). Where the mouth never narrows no particle can be captured, and the share is known.
     """
-    if not narrowings(scene):
+    if not mouth_minima(scene):
         return 0.0
     least = 1.0 / (n + 1)
     return _binomial_error(min(max(share, least), 1.0 - least), n)

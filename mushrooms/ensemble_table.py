@@ -30,7 +30,7 @@ SAME = 1e-6  # relative difference of E0 that writing it in few digits makes
 NOTHING = ("", "nan", "NaN", "NA", "null", "none", "None")
 FLAGS = {"true": "1", "false": "0", "t": "1", "f": "0", "yes": "1", "no": "0"}
 ENERGIES, GAIN = "E1", "s"
-# What a column may be called; of several narrowings or stays the earliest counts.
+# What a column may be called; of several minima of nu or capture intervals the earliest counts.
 NAMES = {
     "E0": r"E_?0|e0|energy_?0",
     ENERGIES: r"E_?[1-9]\d*|e[1-9]\d*|energy(_[1-9]\d*)?",

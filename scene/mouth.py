@@ -7,7 +7,7 @@ and zeros nu is monotone, so its values there show every rise and fall: a zero t
 or by rounding) does no harm, and none that matters is missed.
 
 A swing of nu below SWING of its largest value is rounding, and counts as none: the two minima beside so low a
-peak are one, and a nu that never swings more has no narrowing at all. A plateau counts once, by its middle.
+peak are one, and a nu that never swings more has no minimum at all. A plateau counts once, by its middle.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ def mouth_factors(scene: Mushroom) -> tuple[Law, Law]:
 
 
 @lru_cache(maxsize=256)
-def narrowings(scene: Scene) -> tuple[float, ...]:
-    """Find every narrowing of the mouth in one cycle.
+def mouth_minima(scene: Scene) -> tuple[float, ...]:
+    """Find every local minimum of nu in one cycle.
 
     Args:
         scene: a valid scene; only a mushroom has a mouth.

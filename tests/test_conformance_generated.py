@@ -229,7 +229,7 @@ def corpus():
 
 
 @pytest.mark.parametrize("sample", deep_but([(1, 20), (1, 5), (2, 5)], (1, 20)))
-def test_the_fast_stepper_answers_as_well_in_disguise(sample, corpus, tally):
+def test_the_fast_stepper_answers_as_well_after_a_transform(sample, corpus, tally):
     seed, every = sample
     for vector in corpus[seed::every]:
         worn = draw_transform(vector, seed)
@@ -239,7 +239,7 @@ def test_the_fast_stepper_answers_as_well_in_disguise(sample, corpus, tally):
         assert found.verdict == "pass" or vector.level == "stress"
         assert vector.level != "core" or not found.ulps > SHARP
         tally[f"{found.verdict}"] += 1
-        tally["as published" if worn == Transform() else "in disguise"] += 1
+        tally["as published" if worn == Transform() else "transformed"] += 1
 
 
 def test_no_question_is_asked_as_it_is_published(corpus):
@@ -248,7 +248,7 @@ def test_no_question_is_asked_as_it_is_published(corpus):
     assert len(same) < 0.01 * len(corpus), same
 
 
-def test_a_disguise_is_taken_off_without_a_rounding(corpus):
+def test_a_transform_is_taken_back_without_a_rounding(corpus):
     for vector in corpus[::7]:
         worn = draw_transform(vector, 5)
         known = msgspec.to_builtins(middle(vector.expect[0], vector.state))
@@ -318,7 +318,7 @@ def test_a_replayer_is_not_accepted(seed, is_bold):
     assert any("property" in line for line in run.objections())
 
 
-def test_a_replayer_would_pass_without_disguise(monkeypatch):
+def test_a_replayer_would_pass_without_transforms(monkeypatch):
     monkeypatch.setattr("conformance.suite.run.draw_transform", lambda *_: Transform())
     run = suite.check(replayer(None, False, GROUPS), seed=9, groups=[*GROUPS, "fresh"])
     assert {r.verdict for r in run.results if r.group in GROUPS} == {"pass"}

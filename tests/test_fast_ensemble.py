@@ -1,4 +1,4 @@
-"""Ensembles: the same bits for any number of threads, uniform starts, captured stays."""
+"""Ensembles: the same bits for any number of threads, uniform starts, capture intervals."""
 
 from __future__ import annotations
 
@@ -101,8 +101,8 @@ def test_least_nu_is_found():
     assert stops.times == pytest.approx(np.array([1, 2, 4, 5, 6, 8]) * np.pi / 2)
     assert stops.columns.tolist() == [0, -1, 1, 2, -1, 3]
     assert stops.cycles.tolist() == [-1, -1, 0, -1, -1, 1]
-    assert stops.narrowings == pytest.approx(np.array([[np.pi], [3 * np.pi]]), rel=1e-15)
-    assert cycle_stops(load("fixed-cap-anticlockwise"), 1, ()).narrowings.tolist() == [[0.375]]
+    assert stops.mouth_minima == pytest.approx(np.array([[np.pi], [3 * np.pi]]), rel=1e-15)
+    assert cycle_stops(load("fixed-cap-anticlockwise"), 1, ()).mouth_minima.tolist() == [[0.375]]
 
 
 def test_progress_reaches_the_end():

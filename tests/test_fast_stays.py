@@ -1,4 +1,4 @@
-"""Captured stays in the slots of the narrowings that they span; p_nc where the mouth narrows twice a cycle.
+"""Capture intervals in the slots of the minima of nu that they span; p_nc with two minima a cycle.
 
 The stays are found once more by their definition, in plain Python, along trajectories.
 """
@@ -18,7 +18,7 @@ from fast import starts
 from fast.starts import cycle_stops, initial_states, one_cycle
 from scene import BangBang, Fourier, Mushroom, State, load
 from scene.laws import value
-from scene.mouth import narrowings, start_time
+from scene.mouth import mouth_minima, start_time
 from scene.tables import width_factors
 
 TWICE = tuple(zip(map(float, range(9)), (1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0), strict=True))
@@ -42,7 +42,7 @@ AT_THE_END = Mushroom(r=1.0, h=1.0, nu=Fourier(mean=0.6, omega=1.0, cos=(-0.3,))
 
 
 def stays_along(scene, start, hits):
-    """List the captured stays (begin, end) of a path by their definition; end = infinity if not over."""
+    """List the capture intervals (begin, end) of a path by their definition; end = infinity if not over."""
     found, begin, end = [], math.inf, math.inf
     vx, vy = start.vx, start.vy
     for wall, (_, t, x, y, *after) in hits:
@@ -66,8 +66,8 @@ def slots_along(scene, start, path, cycle):
     begin_of_cycle, end_of_cycle = (start_time(scene) + span * k for k in (cycle, cycle + 1.0))
     hits = zip(path.walls, path.steps.tolist(), strict=True)
     stays = stays_along(scene, start, [hit for hit in hits if hit[1][1] < end_of_cycle])
-    slots = np.full((2, len(narrowings(scene))), np.nan)
-    for m, phase in enumerate(narrowings(scene)):
+    slots = np.full((2, len(mouth_minima(scene))), np.nan)
+    for m, phase in enumerate(mouth_minima(scene)):
         for begin, end in stays:
             if begin <= begin_of_cycle + span * phase <= end:
                 slots[:, m] = begin, min(end, end_of_cycle)
@@ -84,7 +84,7 @@ def test_stays_are_those_of_the_definition(name, tally):
     span = one_cycle(scene)
     energy = 0.5 * (25.0 / span) ** 2
     run = fast.simulate(scene, n_particles=n, energy=energy, n_cycles=n_cycles, seed=3)
-    assert run.t_in.shape == run.t_out.shape == (n, n_cycles, len(narrowings(scene)))
+    assert run.t_in.shape == run.t_out.shape == (n, n_cycles, len(mouth_minima(scene)))
     for i, (t, _, *place) in enumerate(initial_states(scene, n, energy, 3).tolist()):
         start = State(t, *place)
         for cycle in range(n_cycles):
@@ -210,7 +210,7 @@ WRONG = {
 @pytest.mark.parametrize("name", deep_but(["equal", "plateaus"], "equal"))
 def test_other_stays_give_another_p_nc(name, mutant, monkeypatch):
     scene = MOUTHS[name]
-    monkeypatch.setattr(starts, "narrowings", lambda scene: WRONG[mutant](narrowings(scene)))
+    monkeypatch.setattr(starts, "mouth_minima", lambda scene: WRONG[mutant](mouth_minima(scene)))
     z, error = z_score(fast.simulate(scene, n_particles=N, energy=ENERGY[name], seed=1), scene)
     assert abs(z) > 4 + BIAS[name] / error
 

@@ -1,4 +1,4 @@
-"""Orbits and their pictures: starts, sections, captured stays, exponents, exports, and the command on top."""
+"""Orbits and their pictures: starts, sections, capture intervals, exponents, exports, the command."""
 
 from __future__ import annotations
 

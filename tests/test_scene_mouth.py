@@ -1,4 +1,4 @@
-"""Narrowings of the mouth, against brute force: between two, nu rises to one peak and then falls."""
+"""Minima of nu, against brute force: between two, nu rises to one peak and then falls."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from support.depth import deep_among
 
 from scene import BangBang, Cap, Fourier, Mushroom, Stem, load
 from scene import mouth as module
-from scene.mouth import narrowings
+from scene.mouth import mouth_minima
 
 N_SAMPLES = 1 << 13
 ROUNDING = 2.0**-42
@@ -41,10 +41,10 @@ def mouth(scene, phases):
 
 
 def fault(scene, found, n_samples=N_SAMPLES):
-    """Say what is wrong with narrowings: between two, nu must rise, then fall, by more than rounding."""
+    """Say what is wrong with minima of nu: between two, nu must rise, then fall, by more than rounding."""
     if not found:
         nu = mouth(scene, np.arange(n_samples) / n_samples)
-        return None if np.ptp(nu) <= ROUNDING * nu.max() else "nu moves, and no narrowing was found"
+        return None if np.ptp(nu) <= ROUNDING * nu.max() else "nu moves, and no minimum was found"
     if list(found) != sorted(found) or not 0.0 < found[0] <= found[-1] <= 1.0:
         return f"{found} do not rise in (0, 1]"
     for before, after in pairwise([*found, found[0] + 1.0]):
@@ -102,7 +102,7 @@ def test_random_laws(kind, tally):
     several = 0
     for _ in range(300):
         scene = drawn(random, kind)
-        found = narrowings(scene)
+        found = mouth_minima(scene)
         assert fault(scene, found) is None, (fault(scene, found), found, scene)
         several += len(found) > 1
         tally[f"{kind}: narrowings"] += len(found)
@@ -163,7 +163,7 @@ NAMED = {
 @pytest.mark.parametrize("name", NAMED)
 def test_named_mouths(name):
     scene, expected = NAMED[name]
-    assert narrowings(scene) == pytest.approx(expected, rel=1e-12, abs=0)
+    assert mouth_minima(scene) == pytest.approx(expected, rel=1e-12, abs=0)
 
 
 def test_scales_and_short_legs():
@@ -181,7 +181,7 @@ def test_scales_and_short_legs():
         scene = Mushroom(r=length, h=length, w=knots(*pairs, (span, values[0])))
         steps = [v for before, v in pairwise([values[-1], *values]) if v != before]
         neighbours = zip([*steps[-1:], *steps], steps, [*steps[1:], *steps[:1]], strict=False)
-        assert len(narrowings(scene)) == sum(before > v < after for before, v, after in neighbours)
+        assert len(mouth_minima(scene)) == sum(before > v < after for before, v, after in neighbours)
 
 
 def test_narrowings_are_exact_to_rounding():
@@ -190,7 +190,7 @@ def test_narrowings_are_exact_to_rounding():
     for b, share in random.uniform((0.05, -0.9), (0.1, 0.9), size=(200, 2)).tolist():
         a = 4 * b * share
         exact = np.arccos(-a / (4 * b)) / (2 * np.pi)
-        found = narrowings(Mushroom(r=1.0, h=1.0, nu=wave(0.5, (a, b))))
+        found = mouth_minima(Mushroom(r=1.0, h=1.0, nu=wave(0.5, (a, b))))
         assert found == pytest.approx((exact, 1 - exact), rel=2.0**-48)
 
 
@@ -206,13 +206,13 @@ FAULTS = {
 @pytest.mark.parametrize("name", FAULTS)
 def test_wrong_narrowings_are_seen(name):
     scene, _ = NAMED["equal minima"]
-    assert fault(scene, narrowings(scene)) is None
-    assert fault(scene, tuple(sorted(FAULTS[name](narrowings(scene))))) is not None
+    assert fault(scene, mouth_minima(scene)) is None
+    assert fault(scene, tuple(sorted(FAULTS[name](mouth_minima(scene))))) is not None
 
 
 def test_a_zero_left_out_is_seen(monkeypatch):
     """The comparison kills a search that looks at the cuts alone."""
     scene = Mushroom(r=wave(1.0, (), (0.3,)), h=1.0, w=wave(0.5, (0.2, 0.1)))
-    assert fault(scene, narrowings.__wrapped__(scene)) is None
+    assert fault(scene, mouth_minima.__wrapped__(scene)) is None
     monkeypatch.setattr(module, "_zeros", lambda w, r, cuts: np.empty(0))
-    assert fault(scene, narrowings.__wrapped__(scene)) is not None
+    assert fault(scene, mouth_minima.__wrapped__(scene)) is not None

@@ -172,7 +172,7 @@ class Sample(NamedTuple):
     Attributes:
         run: what was asked for.
         s: (n, K) log E / E0 at the end of each cycle.
-        t_in, t_out: (n, K, M) capture interval around each narrowing of the mouth; nan for none.
+        t_in, t_out: (n, K, M) capture interval around each minimum of nu; nan for none.
         takes_part: (n,) which are not in the island all the time.
         phase_s: (n, K, P) log E / E0 at the phases.
         phase_captured: (n, K, P) whether in the island there.

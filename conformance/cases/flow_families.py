@@ -188,7 +188,7 @@ FAMILIES = (
     ),
     Family(
         "flow-stays",
-        "several captured stays: the first is told",
+        "several capture intervals: the first is told",
         partial(_stays, {}, has_stays(2)),
         "sec. 3.2",
         12,

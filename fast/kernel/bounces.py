@@ -1,4 +1,4 @@
-"""What a collision does to a lane: the bounce, and what is known of captured stays."""
+"""What a collision does to a lane: the bounce, and what is known of capture intervals."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def spin_in_disk(beyond, x, y, vx, vy, w):
 
 @packed
 def stay_after(hit, t, beyond, since, until, begin, end):
-    """Return begin and end of a captured stay after a hit, and its end where it is over and to be kept.
+    """Return begin and end of a capture interval after a hit, and its end where it is over and to be kept.
 
     A stay in the cap counts as captured from its first arc hit with |sin phi| > nu to the hit at which that
     ended. It is kept where it spans an instant between `since` and `until`.

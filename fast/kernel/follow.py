@@ -79,13 +79,13 @@ STAYS, MOVES, ENDS = 0, 1, 2
 
 @part
 def keep_stay(j, cycle, begin, end, stops, followed):
-    """Keep a captured stay in the slot of each narrowing of a cycle that it spans, or as the first stay."""
+    """Keep a capture interval in the slot of each minimum of nu that it spans, or as the first interval."""
     t_in, t_out = followed.t_in, followed.t_out
-    for slot in range(stops.narrowings.shape[1]):
+    for slot in range(stops.mouth_minima.shape[1]):
         if stops.is_first_kept:
             is_kept = np.isnan(t_in[j, cycle, slot])
         else:
-            is_kept = begin <= stops.narrowings[cycle, slot] <= end
+            is_kept = begin <= stops.mouth_minima[cycle, slot] <= end
         if is_kept:
             t_in[j, cycle, slot], t_out[j, cycle, slot] = begin, end
 
@@ -111,7 +111,7 @@ def note_stops(a, i, roster, last, stops, followed):
 
 @part
 def note_stay(a, i, roster, stops, followed):
-    """Record a captured stay that is over."""
+    """Record a capture interval that is over."""
     at = roster[NEXT_STOP, i]
     while stops.cycles[at] < 0:  # the last stop ends a cycle
         at += 1

@@ -16,7 +16,7 @@ NEVER = np.inf
 # Rows of a pool, in one flat array: constant strides let the loops vectorise.
 (
     T, T_LOW, X, Y, VX, VY, WALL, SPIN,  # state after the last collision; angular momentum when captured
-    SINCE, UNTIL, STAY_IN, STAY_OUT,  # a captured stay that spans an instant between is kept; begin and end
+    SINCE, UNTIL, STAY_IN, STAY_OUT,  # a capture interval over an instant between is kept; begin, end
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
     # The laws at T. As waves: sine and cosine of the fundamental phase. As pieces: the reference time and
     # number of the piece; radius, half-width, depth and slope, each with derivatives.
@@ -27,7 +27,7 @@ NEVER = np.inf
     END,  # until when the laws are known; minus infinity where they are not
     LIMIT, BACK,  # how long after the reference time a piece holds, and before it for a hop along the arc
     HIT, SURE, S, TRIES,  # the flight: wall, mouth, time; how often the time has been corrected
-    FATE, WHEN,  # what became of it; for LATE its time, for MARKED the end of a captured stay that is over
+    FATE, WHEN,  # what became of it; for LATE its time, for MARKED the end of a capture interval that is over
     # The laws where the flight is guessed to end, in as many rows as those at T; with pieces the flight's
     # begin since REF too, and the radius's mean rate.
     AHEAD, _, _, _, _, _, _, _, _, _, _, _, _, _,

@@ -227,9 +227,9 @@ class Stops(NamedTuple):
         times: (S,) the instants; the last one ends the run.
         columns: (S,) where the energy at an instant is written, -1 for an instant that does not ask for it.
         cycles: (S,) number of the cycle that an instant ends, -1 for others.
-        narrowings: (K, M) when the mouth narrows in each cycle: a captured stay is kept in slot m of cycle k
+        mouth_minima: (K, M) times of minima of nu in each cycle: a capture interval goes to slot m of cycle k
             when it spans that instant.
-        is_first_kept: the first captured stay is kept in slot 0, whatever its length.
+        is_first_kept: the first capture interval is kept in slot 0, whatever its length.
         most: collisions after which a particle is given up; energy may grow without end.
         called_off: (1,) whoever no longer wants what is followed sets this to 1, from another thread: the
             kernel looks at it every few flights, and returns with whatever is there.
@@ -238,14 +238,14 @@ class Stops(NamedTuple):
     times: FloatArray
     columns: IntArray
     cycles: IntArray
-    narrowings: FloatArray
+    mouth_minima: FloatArray
     is_first_kept: bool
     most: int
     called_off: IntArray
 
 
 class Followed(NamedTuple):
-    """What the kernel fills in for N particles, K cycles of M narrowings, and C stops that ask for energies.
+    """What the kernel fills in for N particles, K cycles with M minima of nu, C stops that ask for energies.
 
     Attributes:
         states: (N, 6) last t, its low part, x, y, vx, vy.
@@ -255,7 +255,7 @@ class Followed(NamedTuple):
         energies: (N, C) energy at each stop that asks for it.
         is_captured: (N, C) whether the last arc hit before had |sin phi| > nu, and no wall of the
             stem has been met since.
-        t_in, t_out: (N, K, M) the captured stays that are kept; nan for none.
+        t_in, t_out: (N, K, M) the capture intervals that are kept; nan for none.
         lanes: (N, LANE_ROWS) what goes on from the last stop, nan for who ended before it: see
             fast.kernel.follow; (N, 0) where nobody asks for it.
     """

@@ -1,6 +1,6 @@
 """A run as one file: Parquet, CSV or npz, written block by block, with the same bits.
 
-Tables have a row a particle; what a particle has for each cycle, narrowing or wall stands in columns of its
+Tables have a row a particle; what it has for each cycle, minimum of nu or wall stands in columns of its
 own, counted from 1, or named by the wall: cycle_energies_1, t_in_1_1, wall_counts_arc.
 """
 

@@ -23,7 +23,7 @@ import scene as scenes
 from fast import Ensemble, Paused
 from fast.kernel.follow import LANE_ROWS
 from scene import Mushroom, Scene
-from scene.mouth import narrowings
+from scene.mouth import mouth_minima
 
 SCHEMA = 4  # of a stored run: raised when its files change, so that older ones are refused
 
@@ -143,7 +143,7 @@ FIELDS = {
     "vy": Stored(ONE, "float64", "velocity of the last state"),
     "outcome": Stored(ONE, "int8", f"0 to 3: {OUTCOMES}; -1: not followed yet"),
     "takes_part": Stored(ONE, "int8", "1: counts in means and shares; -1: not followed yet"),
-    "t_in": Stored(SLOTS, "float64", "begin of the capture interval around each narrowing; nan: none"),
+    "t_in": Stored(SLOTS, "float64", "begin of the capture interval around each minimum of nu; nan: none"),
     "t_out": Stored(SLOTS, "float64", "end of that stay"),
     "wall_counts": Stored(("particle", "wall"), "int64", f"collisions with {' '.join(WALLS)}"),
     "n_careful": Stored(ONE, "int64", "collisions left to the careful step"),
@@ -160,14 +160,14 @@ class Shape(NamedTuple):
     Attributes:
         n_particles: in all.
         block: particles of a block; the last one may have fewer.
-        n_cycles, n_narrowings, n_phases: looks at each.
+        n_cycles, n_minima, n_phases: looks at each.
         chunked: cycles of a chunk.
     """
 
     n_particles: int
     block: int
     n_cycles: int
-    n_narrowings: int
+    n_minima: int
     n_phases: int
     chunked: int
 
@@ -182,13 +182,13 @@ class Shape(NamedTuple):
 
     def of(self, name: str, n: int, n_cycles: int) -> tuple[int, ...]:
         """Return the shape of an array for n particles and so many cycles."""
-        sizes = {"cycle": n_cycles, "narrowing": self.n_narrowings, "phase": self.n_phases}
+        sizes = {"cycle": n_cycles, "narrowing": self.n_minima, "phase": self.n_phases}
         sizes |= {"wall": len(WALLS), "row": int(LANE_ROWS)}
         return (n, *(sizes[dim] for dim in FIELDS[name].dims[1:]))
 
     @property
     def names(self) -> list[str]:
-        """Return the arrays that hold anything: a scene without narrowings has no captured stays."""
+        """Return the arrays that hold anything: a scene without minima of nu has no capture intervals."""
         return [name for name in FIELDS if 0 not in self.of(name, 1, 1)]
 
     @property
@@ -200,7 +200,7 @@ class Shape(NamedTuple):
 
 def shape_of(spec: RunSpec, n_particles: int, block: int, chunked: int | None = None) -> Shape:
     """Return the sizes of a run; in a chunk it has so many cycles, by default all."""
-    looks = len(narrowings(spec.scene)), len(spec.phases)
+    looks = len(mouth_minima(spec.scene)), len(spec.phases)
     return Shape(n_particles, block, spec.n_cycles, *looks, chunked or spec.n_cycles)
 
 

@@ -164,7 +164,7 @@ def captured_cannot_leave(flight, plain, s):
 
 
 def family_of_laws(scene):
-    """Return what a law is in a scene, and its numbers in proportion: the same in all its disguises."""
+    """Return what a law is in a scene, and its numbers in proportion: the same in all its images."""
     return json.dumps([sorted(laws(scene)), *(_proportions(law) for law in laws(scene).values())])
 
 

@@ -39,7 +39,7 @@ from conformance.plain.flow import PlainPath
 from conformance.suite.checks import checks_of
 from conformance.suite.symmetry import Transform, draw_transform
 from conformance.verify import Verdict, verify_line
-from fast import __main__ as fast_program
+from fast import flows
 from fast.__main__ import carry, follow
 from scene import BadInput, BangBang, Fourier, Horizon, Mushroom, State, Undecided, from_data
 from scene.given import MAX_KNOTS
@@ -216,7 +216,7 @@ def test_a_particle_that_is_lost_after_its_capture_has_no_interval(monkeypatch):
         assert interval is not None
     assert plain.flow(scene, [start], t_end, lost) == [(Undecided("lost"), None)]
     run = SimpleNamespace(outcomes=[Undecided("lost")], t_in=np.array([1.0]), t_out=np.array([2.0]))
-    monkeypatch.setattr(fast_program, "carry_judged", lambda *_: run)
+    monkeypatch.setattr(flows, "carry", lambda *_: run)
     assert carry(scene, [start], t_end) == [(Undecided("lost"), None)]
 
 

@@ -183,7 +183,7 @@ def of_others(arrays, *more):
     return paused_of({**arrays, LANES: arrays[LANES][::-1]}, *more)
 
 
-@pytest.mark.parametrize("faulty", [forgotten(pools.VX), forgotten(pools.SINE), of_others])
+@pytest.mark.parametrize("faulty", [forgotten(pools.VX), forgotten(pools.PHASE_SINE), of_others])
 def test_a_run_that_would_go_on_otherwise_does_not(command_line, tmp_path, monkeypatch, faulty):
     """The first particles are followed both ways before a block is touched."""
     summary_of(command_line(*arguments(tmp_path, 1)))

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 import fast
 from conformance.bench import baselines, growth, record, solvers, workloads
@@ -170,7 +170,9 @@ def _table(found: Record) -> Table:
     from mushrooms.reports import bench_page
 
     numbers = ("ns/collision", "quartiles", "median ulps", "worst ulps", "wrong", "undecided", "left")
-    table = Table("workload", "stepper", title="Speed against error", title_justify="left")
+    table = Table(
+        "workload", Column("stepper", no_wrap=True), title="Speed against error", title_justify="left"
+    )
     for name in (*numbers, "wrong of further"):
         table.add_column(name, justify="right")
     for p in found.points:

@@ -30,8 +30,7 @@ from theory.volumes import free_share
 MAX_HALVINGS = 256  # a panel of 2^-256 of its piece
 NARROWEST = 1e-20  # of the widest mouth: `tolerance` of the cycle and rounding stay far below what nu is
 
-FEWEST = 8  # least degree of the grid at which a part is first tried; its points are among those of the next
-TELLING = 16  # degree from which coefficients show how they fall
+FEWEST = 16  # degree of the grid at which a part is first tried; its points are among those of the next
 PROMISE = 0.92  # of the digits wanted, in proportion to its degree, are to be seen on such a grid
 
 
@@ -351,9 +350,9 @@ def _panel(
 ) -> Panel | None:
     """Sample a part of a piece and integrate from `start` = (A, B); None when it is not resolved.
 
-    It is sampled on one grid after another, until one resolves it, or shows that the next will not do.
-    Coefficients fall geometrically, or more slowly near a singularity: were that wrong, the part would only
-    be halved once more than needed.
+    It is sampled on one grid after another, given up where one shows that the next will not do. Coefficients
+    fall geometrically, or more slowly near a singularity: were that wrong, the part would only be halved once
+    more than needed.
     """
     ctx, width, n = cycle.ctx, cycle.ctx.ldexp(1, -part[1]), grids[-1].n
     swing = free_share(ctx, cycle.nu_max) - free_share(ctx, cycle.nu_min)
@@ -367,20 +366,14 @@ def _panel(
         nu, t_in, t_out, dA, dB, log_g = (
             list(column) for column in zip(*map(known.get, places), strict=True)
         )
-        c_A, c_B, c_g, *c_times = map(grid.coefficients, (dA, dB, log_g, t_in, t_out))
+        c_A, c_B, c_g = map(grid.coefficients, (dA, dB, log_g))
         # Of a narrow mouth a and b are large, and A and B in proportion.
         tail = max(_tail(c_g), *(_tail(c) / max(swing, *map(abs, c)) for c in (c_A, c_B)))
-        # Times are plotted only: no part is halved for them.
-        late = 0 if grid.n == n else max(_tail(c) / cycle.period for c in c_times)
-        if max(tail, late) <= ctx.mpf(10) ** -target:
-            A, B = (
-                [at + rise for rise in grid.running_integral(c)]
-                for at, c in zip(start, (c_A, c_B), strict=True)
-            )
-            return Panel(nu, t_in, t_out, dA, log_g, A, B)
-        if grid.n >= TELLING and tail > ctx.mpf(10) ** (-target * PROMISE * grid.n / n):
-            break
-    return None
+        share = 1 if grid.n == n else PROMISE * grid.n / n
+        if tail > ctx.mpf(10) ** (-target * share):
+            return None
+    A, B = ([at + rise for rise in grid.running_integral(c)] for at, c in zip(start, (c_A, c_B), strict=True))
+    return Panel(nu, t_in, t_out, dA, log_g, A, B)
 
 
 def _descent(piece: CapturePiece, u: Any) -> tuple[Any, Any]:

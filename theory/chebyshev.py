@@ -160,8 +160,8 @@ def _cosines(n: int, prec: int) -> tuple[Any, ...]:
 
 
 def even_degree(n: int) -> int:
-    """Return a degree of at least n that halves at least thrice, and a large one down to some LEAST."""
-    unit = 1 << max((n // LEAST).bit_length(), 4)
+    """Return a degree of at least n that halves at least twice, and a large one down to some LEAST."""
+    unit = 1 << max((n // LEAST).bit_length(), 3)
     return -(-n // unit) * unit
 
 

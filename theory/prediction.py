@@ -205,8 +205,7 @@ def converged(
     ctx = cycle.ctx
     noise, agreement = ctx.mpf(10) ** -(digits + GUARD - 10), ctx.mpf(10) ** -(digits + 2)
     previous: tuple[Any, ...] | None = None
-    # The first two show enough of nearly every cycle; more is wanted where energies change by very little.
-    for number, target in enumerate((digits + 4, *range(digits + 8, digits + GUARD - 8, 12)), 1):
+    for number, target in enumerate(range(digits + 4, digits + GUARD - 8, 12), 1):
         on_progress = None if progress is None else partial(progress, number)
         found = solved(scene, cycle, target, on_progress)
         current = tuple(ctx.zero if abs(x) < noise else x for x in figures(found))

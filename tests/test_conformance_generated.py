@@ -84,7 +84,7 @@ def test_right_steppers_pass_each_row(name):
 
 
 def features(vector):
-    """Name what a question has that the corpus has seldom."""
+    """Name what a question has that the corpus rarely has."""
     scene, step = from_data(vector.scene), vector.expect[0].steps[0]
     kinds = {type(law) for law in laws(scene).values()}
     return {

@@ -174,6 +174,7 @@ def _compiled_widest_registers(_context: Any) -> Any:
     def generate(context: Any, builder: ir.IRBuilder, _: Any, __: Any) -> Any:
         # llvmlite's own `add` knows none of the attributes that are strings.
         set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+        builder.function.attributes.alignstack = 64
         return context.get_dummy_value()
 
     return types.none(), generate

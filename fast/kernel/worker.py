@@ -19,7 +19,7 @@ from numba.core.typing import Signature
 from numba.core.typing import signature as returns
 
 from fast.kernel.arithmetic import SAFETY
-from fast.kernel.compiling import HOW, caller, kept
+from fast.kernel.compiling import HOW, caller, kept, widest_registers
 from fast.kernel.lane_laws import DEGREES, NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
 from fast.kernel.pools import LANES, POOL_SIZE
@@ -108,6 +108,7 @@ def _loop(step, is_slope_moving, form):
     @kept(step.__name__, is_slope_moving, form, **HOW)
     def loop(a, n, table, waves, slope, limits):
         """Take a step of each lane: see fast.kernel.lanes."""
+        widest_registers()
         step(a, n, table, waves if is_waves else None, None if is_slope_moving else slope, terms, limits)
 
     return loop

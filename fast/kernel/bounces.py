@@ -137,10 +137,10 @@ def stay_after(hit, t, beyond, since, until, begin, end):
 
 
 @packed
-def count_hit(a, i, hit, one):
-    """Count a hit of a wall; `one` is 1, or 0 for none."""
-    a[N_ARC + i] += one if hit == ON_ARC else 0.0
-    a[N_BASE + i] += one if hit == ON_BASE else 0.0
-    a[N_LEFT + i] += one if hit == ON_LEFT else 0.0
-    a[N_RIGHT + i] += one if hit == ON_RIGHT else 0.0
-    a[N_FLOOR + i] += one if hit == ON_FLOOR else 0.0
+def count_hit(a, i, hit):
+    """Count a hit of a wall."""
+    a[N_ARC + i] += 1.0 if hit == ON_ARC else 0.0
+    a[N_BASE + i] += 1.0 if hit == ON_BASE else 0.0
+    a[N_LEFT + i] += 1.0 if hit == ON_LEFT else 0.0
+    a[N_RIGHT + i] += 1.0 if hit == ON_RIGHT else 0.0
+    a[N_FLOOR + i] += 1.0 if hit == ON_FLOOR else 0.0

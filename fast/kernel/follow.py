@@ -184,7 +184,7 @@ def land_carefully(pool, a, i, code, s, p, worker):
     a[SPIN + i] = spin_in_disk(beyond, p.x, p.y, p.vx, p.vy, w)
     if pool == DISK:
         a[SPIN + i] = p.x * p.vy - p.y * p.vx
-    count_hit(a, i, hit, 1.0)
+    count_hit(a, i, hit)
     put_particle(a, i, p)
     a[WALL + i], a[S + i], a[TRIES + i] = hit, s, 0.0
     if worker.is_laned:

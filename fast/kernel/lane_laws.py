@@ -257,23 +257,19 @@ def laws_in(a, place, waves, is_relative, slope, degree):
 
 
 @packed
-def write_laws(a, place, laws, is_new, slope):
-    """Write laws of pieces into the rows of a lane that begin at `place`, if they are new."""
-    a[place] = laws.r if is_new else a[place]
-    a[place + STRIDE] = laws.r1 if is_new else a[place + STRIDE]
-    a[place + 2 * STRIDE] = laws.r2 if is_new else a[place + 2 * STRIDE]
-    a[place + 3 * STRIDE] = laws.r3 if is_new else a[place + 3 * STRIDE]
-    a[place + 4 * STRIDE] = laws.w if is_new else a[place + 4 * STRIDE]
-    a[place + 5 * STRIDE] = laws.w1 if is_new else a[place + 5 * STRIDE]
-    a[place + 6 * STRIDE] = laws.w2 if is_new else a[place + 6 * STRIDE]
-    a[place + 7 * STRIDE] = laws.h if is_new else a[place + 7 * STRIDE]
-    a[place + 8 * STRIDE] = laws.h1 if is_new else a[place + 8 * STRIDE]
-    a[place + 9 * STRIDE] = laws.h2 if is_new else a[place + 9 * STRIDE]
+def write_laws(a, place, laws, slope):
+    """Write laws of pieces into the rows of a lane that begin at `place`."""
+    a[place], a[place + STRIDE], a[place + 2 * STRIDE], a[place + 3 * STRIDE] = (
+        laws.r,
+        laws.r1,
+        laws.r2,
+        laws.r3,
+    )
+    a[place + 4 * STRIDE], a[place + 5 * STRIDE], a[place + 6 * STRIDE] = laws.w, laws.w1, laws.w2
+    a[place + 7 * STRIDE], a[place + 8 * STRIDE], a[place + 9 * STRIDE] = laws.h, laws.h1, laws.h2
     if slope is None:
-        a[place + 10 * STRIDE] = laws.m if is_new else a[place + 10 * STRIDE]
-        a[place + 11 * STRIDE] = laws.m1 if is_new else a[place + 11 * STRIDE]
-        a[place + 12 * STRIDE] = laws.m2 if is_new else a[place + 12 * STRIDE]
-    a[place + 13 * STRIDE] = laws.w_low if is_new else a[place + 13 * STRIDE]
+        a[place + 10 * STRIDE], a[place + 11 * STRIDE], a[place + 12 * STRIDE] = laws.m, laws.m1, laws.m2
+    a[place + 13 * STRIDE] = laws.w_low
 
 
 @packed
@@ -304,7 +300,7 @@ def read_pieces(a, i, place, s, is_relative, slope, degree):
     if slope is None:
         m, m1, m2, _ = law_at(a, SLOPE_LAW + i, STRIDE, u, u, degree)
     a[BEFORE + i], a[MEAN_RATE + i] = before, mean_rate
-    write_laws(a, place, LawsAt(r, r1, r2, r3, w, w_low, w1, w2, h, h1, h2, m, m1, m2), True, slope)
+    write_laws(a, place, LawsAt(r, r1, r2, r3, w, w_low, w1, w2, h, h1, h2, m, m1, m2), slope)
 
 
 @packed
@@ -334,14 +330,13 @@ def room_ahead(a, i, s, delta, waves):
 
 
 @packed
-def move_laws(a, i, delta, is_moved, at_hit, waves, slope):
+def move_laws(a, i, delta, at_hit, waves, slope):
     """Take the laws at the hit, `delta` after the end that was guessed, for the present ones."""
     if waves is None:
-        write_laws(a, R0 + i, at_hit, is_moved, slope)
+        write_laws(a, R0 + i, at_hit, slope)
     else:
         sine, cosine, turn = a[AHEAD + i], a[AHEAD + STRIDE + i], waves.omega * delta
-        a[PHASE_SINE + i] = fma(turn, cosine, sine) if is_moved else a[PHASE_SINE + i]
-        a[PHASE_COSINE + i] = fma(-turn, sine, cosine) if is_moved else a[PHASE_COSINE + i]
+        a[PHASE_SINE + i], a[PHASE_COSINE + i] = fma(turn, cosine, sine), fma(-turn, sine, cosine)
 
 
 @part

@@ -256,13 +256,14 @@ def land(a, i, table, waves, slope, degree, limits):
     result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
     flight = Judged(s, delta, within, result)
     is_moved, at_hit = settle(a, i, flight, outset, end, there, is_mushroom, slope)
-    move_laws(a, i, delta, is_moved, at_hit, waves, slope)
+    if is_moved:
+        move_laws(a, i, delta, at_hit, waves, slope)
 
 
 @packed
 def settle(a, i, flight, outset, end, there, is_mushroom, slope):
     """Bounce off the wall that was met; returns whether the particle moves on, and the laws at the hit."""
-    hit, wall, vx, vy = a[HIT + i], outset.wall, outset.vx, outset.vy
+    hit, vx, vy = a[HIT + i], outset.vx, outset.vy
     t, t_low, at, at_hit, is_moved = arrive(a, i, flight, outset, end, there)
     at = Place(at.x, at.x_low, 0.0 if hit == ON_BASE else at.y, at.y_low)
     vx_s, vy_s = off_the_wall(hit, at, vx, vy, at_hit, slope)
@@ -272,11 +273,10 @@ def settle(a, i, flight, outset, end, there, is_mushroom, slope):
         hit, t, beyond, a[SINCE + i], a[UNTIL + i], a[STAY_IN + i], a[STAY_OUT + i]
     )
     is_quiet = kept == NEVER if spin == 0.0 else False
-    count_hit(a, i, hit, 1.0 if is_moved else 0.0)
-    a[STAY_IN + i] = begin if is_moved else a[STAY_IN + i]
-    a[STAY_OUT + i] = over if is_moved else a[STAY_OUT + i]
+    if is_moved:
+        count_hit(a, i, hit)
+        a[STAY_IN + i], a[STAY_OUT + i], a[WALL + i] = begin, over, hit
     a[SPIN + i] = spin if is_moved else 0.0
-    a[WALL + i] = hit if is_moved else wall
     a[WHEN + i] = kept if is_moved else t
     move(a, i, flight, is_moved, is_quiet, (t, t_low, at.x, at.y, vx_s, vy_s))
     return is_moved, at_hit
@@ -304,12 +304,8 @@ def move(a, i, flight, is_moved, is_quiet, state):
     a[S + i] = s + delta if within > 0.0 else s  # from laws out of their reach nothing is learnt
     tries = a[TRIES + i] + 1.0
     a[TRIES + i] = tries if result == COARSE else (tries if result == FAR else 0.0)
-    a[T + i] = t if is_moved else a[T + i]
-    a[T_LOW + i] = t_low if is_moved else a[T_LOW + i]
-    a[X + i] = x if is_moved else a[X + i]
-    a[Y + i] = y if is_moved else a[Y + i]
-    a[VX + i] = vx if is_moved else a[VX + i]
-    a[VY + i] = vy if is_moved else a[VY + i]
+    if is_moved:
+        a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i] = t, t_low, x, y, vx, vy
 
 
 @packed
@@ -384,8 +380,10 @@ def chord(a, n, table, waves, slope, degree, limits):
         vx_s, vy_s = off_the_arc_spinning(at, vx, vy, at_hit.r, at_hit.r1, spin)
         # A chord that crosses y = 0 hits the base.
         crossed = 1.0 if y * at.y < 0.0 else 0.0
-        a[N_ARC + i] += 1.0 if is_moved else 0.0
-        a[N_BASE + i] += crossed if is_moved else 0.0
+        if is_moved:
+            a[N_ARC + i] += 1.0
+            a[N_BASE + i] += crossed
         a[WHEN + i] = NEVER if is_moved else t
         move(a, i, flight, is_moved, True, (t, t_low, at.x, at.y, vx_s, vy_s))
-        move_laws(a, i, delta, is_moved, at_hit, waves, slope)
+        if is_moved:
+            move_laws(a, i, delta, at_hit, waves, slope)

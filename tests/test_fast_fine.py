@@ -32,8 +32,9 @@ N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "250"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
 SHARP = 4.0  # units that nearly all answers keep
 WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.kernel.fine_step
-# So soon, in periods, or leaving its wall so slowly, in parts of the speed, that terms cancel.
-BRIEF, GRAZING = 2.0**-33, 2.0**-36
+# So soon, in periods, that terms cancel; or leaving its wall so slowly, in parts of the speed, that pairs,
+# right to 2^-104 of the speed, do not tell the time to the 2^-80 of it that the fine step asks for.
+BRIEF, GRAZING = 2.0**-33, 2.0**-24
 START = State(0.1, 0.2, 0.3, 140.0, 30.0)
 
 

@@ -7,7 +7,8 @@ a wall keeps its digits; place, wall speed and reflection follow in pairs. A pat
 
 Not handled: a hop along a wall across a knot of its law is the difference of two values, and one along a
 wall whose harmonics cancel in its speed meets their rounding: both keep 2^-104 of the table's size only.
-Nor is the place after a long flight: it keeps 2^-104 of the way.
+Nor is the place after a long flight: it keeps 2^-104 of the way. A hop that leaves its wall at less than
+2^-24 of the particle's speed may be undecided: its time is not known to `LOOSE`.
 """
 
 from __future__ import annotations

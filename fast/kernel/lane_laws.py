@@ -347,7 +347,9 @@ def set_piece(a, i, piece, scene, pieces, degree):
     if scene.laws[RADIUS, KIND] == CONSTANT:
         a[BACK + i] = -NEVER
     for row in range(4):
-        for j in range(degree + 2):
+        # The lane has 0 where no piece has anything else.
+        n_coefficients = 1 if scene.laws[row, KIND] == CONSTANT else degree + 2
+        for j in range(n_coefficients):
             a[LAWS + (row * N_COEFFICIENTS + j) * STRIDE + i] = pieces.coefficients[piece, row, j]
 
 

@@ -188,23 +188,19 @@ NO_OUTCOMES = {
     "a text": lambda c: replace(c, x="0.5"),
     "an integer beyond all floats": lambda c: replace(c, t=10**400),
     "a horizon nowhere": lambda c: Horizon(c.t, math.nan, c.y, c.vx, c.vy),
+    "a refusal of a state clearly inside": lambda _: Rejected("no"),
 }
 
 
 @pytest.mark.parametrize("name", PROPERTIES)
-@pytest.mark.parametrize("no_outcome", NO_OUTCOMES.values(), ids=NO_OUTCOMES)
-def test_what_is_no_outcome_is_refused(name, no_outcome):
+@pytest.mark.parametrize("no_outcome", NO_OUTCOMES)
+@pytest.mark.parametrize("question", [GALLERY, LIFT], ids=["cap", "stem"])
+def test_what_is_no_outcome_is_refused(name, no_outcome, question):
     """It is nothing to compare: a stepper that forgets to return would hold every property."""
     with pytest.raises(AssertionError) as refusal:
-        PROPERTIES[name](lambda *question: no_outcome(plain.next_collision(*question)), *LIFT)
+        PROPERTIES[name](lambda *asked: NO_OUTCOMES[no_outcome](plain.next_collision(*asked)), *question)
     assert re.fullmatch(r"outcome: .*, must be .*; \{\"cmd\": \"step\".*\}", str(refusal.value))
-
-
-@pytest.mark.parametrize("name", PROPERTIES)
-@pytest.mark.parametrize("question", [GALLERY, LIFT], ids=["cap", "stem"])
-def test_refusing_every_state_holds_no_property(name, question):
-    with pytest.raises(AssertionError, match=r"outcome: .*must be no refusal of a state clearly inside"):
-        PROPERTIES[name](lambda *_: Rejected("no"), *question)
+    assert ("no refusal of a state clearly inside" in str(refusal.value)) == ("a refusal" in no_outcome)
 
 
 def test_what_is_clearly_inside_is_refused_by_nobody(tally):

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import math
 import shutil
 from collections import Counter
 from pathlib import Path
@@ -17,10 +16,8 @@ from conformance.cases.coverage_families import FAMILIES as COVERAGE
 from conformance.cases.families import CATALOGUE
 from conformance.cases.flow_families import FAMILIES as FLOWS
 from conformance.vectors import MANIFEST, BadCorpus, digest, load, manifest, request
-from scene import BadInput, BangBang, Fourier, catalogue, from_data
-from scene.laws import bounds
+from scene import BadInput, catalogue
 from scene.protocol.messages import Command
-from scene.tables import laws
 
 CORPUS = Path(__file__).parent.parent / "conformance" / "corpus"
 # As published, but for the allowance of grazing/37, which 1.3 states on both sides of a knot.
@@ -88,54 +85,9 @@ def test_what_the_corpus_holds(corpus, tally):
     assert sum(path.stat().st_size for path in CORPUS.iterdir()) < MOST_BYTES
 
 
-def test_flows_end_at_their_horizon_and_capture_at_the_arc(corpus):
-    for answer in (vector.expect[0] for vector in corpus if vector.kind == "flow"):
-        assert answer.outcome == "horizon"
-        assert [step.wall for step in answer.steps].index(None) == len(answer.steps) - 1
-        assert all(answer.steps[begin].wall == "arc" and begin < end for begin, end in answer.stays)
-
-
 def test_lines_published_with_1_0_are_unchanged():
     files = {name: file for name, file in manifest().files.items() if name not in NEW_SINCE}
     assert digest(files, ()) == DIGEST_OF_1_0
-
-
-def periods(vector, time):
-    return abs(float(time)) / (from_data(vector.scene).period or math.inf)
-
-
-def laws_of(vector, kind=object):
-    return [law for law in laws(from_data(vector.scene)).values() if isinstance(law, kind)]
-
-
-# What groups promise: a number of each vector, its bound, and how many reach it.
-PROMISES = [
-    (
-        "knots-off-zero",
-        lambda v: max((abs(law.knots[0][0]) for law in laws_of(v, BangBang)), default=0),
-        0.25,
-        30,
-    ),
-    ("waiting", lambda v: periods(v, v.expect[0].steps[0].centre("dt")), 20, 25),
-    ("waiting", lambda v: periods(v, v.expect[0].steps[0].centre("dt")), 100, 5),
-    ("far-phase", lambda v: periods(v, v.state.t), 2**31, 20),
-    ("far-mouth", lambda v: periods(v, v.state.t), 2**31, 20),
-    (
-        "many-harmonics",
-        lambda v: max((len(law.harmonics()) for law in laws_of(v, Fourier)), default=0),
-        4,
-        20,
-    ),
-    ("mixed-laws", lambda v: len(set(map(type, laws_of(v)))), 2, 30),
-    ("mixed-laws", lambda v: len(set(map(type, laws_of(v)))), 3, 10),
-    # How near 1 nu comes, as a number that grows.
-    ("mouth-nearly-whole", lambda v: 1 / (1 - bounds(from_data(v.scene).nu).highest), 0.99e9, 25),
-]
-
-
-@pytest.mark.parametrize(("group", "measure", "bound", "least"), PROMISES)
-def test_groups_hold_what_they_promise(corpus, group, measure, bound, least):
-    assert sum(measure(vector) >= bound for vector in corpus if vector.group == group) >= least
 
 
 def test_levels_are_cumulative(corpus):

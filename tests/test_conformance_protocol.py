@@ -1,16 +1,15 @@
 """Protocol 1 as our servers and the example programs speak it; the examples are graded at level core.
 
-Spoilt lines and files are refused without a traceback, by servers, the runner and the loader of scenes.
-`MUSHROOMS_LINES=20000 MUSHROOMS_RUNS=1000 pytest tests/test_conformance_protocol.py` spoils 20,000 lines of
-each kind, 120,000 in all, and answers 1000 runs with nonsense; it takes some thirty minutes.
+Spoilt lines are refused without a traceback, by servers and the runner; spoilt scene files are in
+test_scene_load. `MUSHROOMS_LINES=20000 MUSHROOMS_RUNS=1000 pytest tests/test_conformance_protocol.py` spoils
+20,000 lines for each of the three servers and the runner, and answers 1000 runs with nonsense; it takes some
+thirty minutes.
 """
 
 import io
 import json
-import math
 import os
 import random
-import struct
 import subprocess
 import sys
 import time
@@ -39,7 +38,7 @@ from conformance.suite.checks import ensembles, timing
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import VERDICTS
 from conformance.suite.session import Limits
-from scene import BadInput, Horizon, load
+from scene import Horizon
 from scene.load import read_data
 from scene.protocol.messages import Timed
 from scene.protocol.wire import serve
@@ -185,9 +184,9 @@ def test_session(name, ask):
     start, echo, one, zero, none, rest, refused = found  # and nothing after `stop`
     assert start["name"] == name
     assert set(start["tables"]) == {"cap", "stem", "mushroom"}
-    assert [struct.pack("<d", v) for v in echo["values"]] == [struct.pack("<d", v) for v in numbers]
+    assert repr(echo["values"]) == repr(numbers)
     assert (one["seq"], one["outcome"], one["wall"]) == (5, "collision", "arc")
-    assert [math.copysign(1.0, value) for value in zero["values"]] == [-1.0, 1.0]
+    assert repr(zero["values"]) == repr([-0.0, 0.0])
     assert none["seq"] == 0
     assert "protocol = 2" in refused["reason"]
     # A particle at rest has no last collision; a horizon at infinity had been written as null.
@@ -267,21 +266,6 @@ def test_the_runner_reads_every_line_or_says_wrong_format(tally):
     assert min(tally["wrong-format"], tally["pass"], tally["fail"]) > N_LINES / 20
 
 
-@pytest.mark.parametrize("suffix", [".json", ".toml"])
-def test_a_scene_file_is_read_or_refused_in_one_line(suffix, tmp_path, tally):
-    path = tmp_path / f"scene{suffix}"
-    for line in fuzz.lines(3, N_LINES, lambda draw: draw.choice(fuzz.scenes_known)):
-        path.write_bytes(line if suffix == ".json" else fuzz.as_toml(line))
-        refusal = ""
-        try:
-            load(str(path))
-        except BadInput as error:
-            refusal = str(error)
-        assert "\n" not in refusal, line
-        tally["refused" if refusal else "read"] += 1
-    assert min(tally["refused"], tally["read"]) > N_LINES / 20
-
-
 def nonsense(draw, share):
     """Return what answers lines as the fast stepper does, but for a share of nonsense of the right seq."""
 
@@ -343,12 +327,10 @@ ENGINES = {
 
 
 @pytest.mark.parametrize("name", ENGINES)
-def test_the_kit_makes_an_answer_of_whatever_an_engine_returns(name, monkeypatch):
+def test_the_kit_makes_an_answer_of_whatever_an_engine_returns(name, monkeypatch, capsysbinary):
     engine, expected = ENGINES[name]
-    out = io.BytesIO()
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(json.dumps(GOOD).encode() + b"\n")))
-    monkeypatch.setattr(sys, "stdout", SimpleNamespace(buffer=out))
     kit.serve_engine("made-up", engine)
-    answer = json.loads(out.getvalue())
+    answer = json.loads(capsysbinary.readouterr().out)
     assert {field: answer[field] for field in expected} == expected
     assert answer["seq"] == 5

@@ -40,7 +40,7 @@ LONGEST = [
     "test_fast_lane_search.py",
     "test_mushrooms_check.py",
     "test_conformance_generated.py",
-    "test_conformance_agreement.py",
+    "test_conformance_grading.py",
     "test_conformance_suite.py",
     "test_conformance_audit.py",
     "test_conformance_protocol.py",
@@ -54,7 +54,6 @@ LONGEST = [
     "test_theory_large_deviations.py",
     "test_conformance_mutants.py",
     "test_conformance_vectors.py",
-    "test_conformance_grading.py",
     "test_scene_mixed.py",
     "test_fast_stays.py",
 ]

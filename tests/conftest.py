@@ -50,7 +50,6 @@ LONGEST = [
     "test_conformance_properties.py",
     "test_theory_distribution.py",
     "test_conformance_bench.py",
-    "test_conformance_session.py",
     "test_theory_large_deviations.py",
     "test_conformance_mutants.py",
     "test_conformance_vectors.py",

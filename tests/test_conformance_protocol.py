@@ -23,7 +23,7 @@ from support.depth import deep_but
 from support.edges import EDGES, LATE_EDGES, REST, is_among
 from support.faulty_steppers import faulty
 from support.schemas import validator
-from test_conformance_session import made_up
+from test_conformance_suite import made_up
 
 import fast
 import fast.__main__ as fast_server

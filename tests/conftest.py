@@ -52,7 +52,7 @@ LONGEST = [
     "test_conformance_bench.py",
     "test_theory_large_deviations.py",
     "test_conformance_mutants.py",
-    "test_conformance_vectors.py",
+    "test_conformance_cases.py",
     "test_scene_mixed.py",
     "test_fast_stays.py",
 ]

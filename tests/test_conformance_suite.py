@@ -402,14 +402,17 @@ def test_what_is_asked_by_name_is_asked_alone(monkeypatch, groups):
     assert (run.exit_code(), run.speed) == (0 if "promise" not in groups else 1, None)  # nothing was graded
 
 
-def test_what_is_not_offered_is_not_asked():
-    vector = made_up(0)
-    assert missing(INTRODUCTION, "step", vector.scene) == ""
-    moving = msgspec.structs.replace(vector, scene={"table": "stem", "w": 1.0, "h": {"kind": "fourier"}})
-    assert missing(INTRODUCTION, "step", moving.scene) == "table stem, law fourier"
-    assert missing(INTRODUCTION, "trajectory", vector.scene) == "profile trajectory"
-    assert missing(INTRODUCTION, "step", None) == ""  # what must be refused needs no table
-    assert suite.ask_vector(SimpleNamespace(introduction=INTRODUCTION), moving).verdict == "unsupported"
+@pytest.mark.parametrize(
+    ("profile", "scene", "lacking"),
+    [
+        ("step", {"table": "cap", "r": 1.0}, ""),
+        ("step", {"table": "stem", "w": 1.0, "h": {"kind": "fourier"}}, "table stem, law fourier"),
+        ("trajectory", {"table": "cap", "r": 1.0}, "profile trajectory"),
+        ("step", None, ""),  # what must be refused needs no table
+    ],
+)
+def test_what_is_not_offered_is_not_asked(profile, scene, lacking):
+    assert missing(INTRODUCTION, profile, scene) == lacking
 
 
 def test_levels_and_groups_are_chosen():

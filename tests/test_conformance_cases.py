@@ -210,8 +210,8 @@ def test_the_command_refuses_bad_input(command_line, arguments):
 
 
 def test_a_false_claim_makes_no_vector(monkeypatch):
-    """The reference made to be wrong about the velocity after a hit: the verifier refuses."""
-    faults.MUTANTS["half the kick"](monkeypatch)
+    """The reference made to be wrong in late digits: the verifier refuses."""
+    faults.rough_terms(monkeypatch)
     question = Question(load("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0, group="lie")
     with pytest.raises(FalseClaim, match="lie/1 is false: "):
         certify(question, 1)

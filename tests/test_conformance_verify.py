@@ -21,6 +21,7 @@ from typing import Any
 
 import flint
 import pytest
+from support.depth import deep_among
 from support.falsifier import Line, falsify, numbers
 from support.forged_claims import KINDS, REFUSALS, draw, judge, lines, plain, pool
 from support.truth import IS_DEEP
@@ -175,7 +176,7 @@ def test_no_claim_of_the_corpus_is_falsified_by_sampling():
     assert [(line["id"], wrong) for line in sample() if (wrong := falsify(line, 100))] == []
 
 
-@pytest.mark.parametrize("kind", FALSIFIED)
+@pytest.mark.parametrize("kind", deep_among(FALSIFIED, "a number moved far"))
 def test_a_false_claim_is_falsified_by_sampling(kind):
     name, forge = KINDS[kind]
     random, n_seen = Random(kind), 0

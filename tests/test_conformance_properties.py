@@ -79,22 +79,19 @@ SLANTED = (Stem(w=1.0, h=1.0, slope=0.25), State(0.5, 0.1, -0.5, -2.0, 0.25), 9.
 def test_the_questions_of_a_broken_property_are_those_that_were_sent(name):
     """The question as it was given does not repeat a failure of its image: of a slope sent as a law, say."""
     question = SLANTED if name == "static-limit" else BREATHING
-    sent, spoilt = [], []
+    sent = {}
 
     def step(scene, state, t_end):
-        line = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
-        sent.append(json.dumps({"cmd": "step", "seq": 1, **line}))
+        asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
+        line, is_image = json.dumps({"cmd": "step", "seq": 1, **asked}), (scene, state, t_end) != question
+        sent[line] = is_image
         found = plain.next_collision(scene, state, t_end)
-        if (scene, state, t_end) == question:
-            return found
-        spoilt.append(sent[-1])
-        return replace(found, vx=1.01 * found.vx)
+        return replace(found, vx=1.01 * found.vx) if is_image else found
 
     with pytest.raises(AssertionError) as broken:
         PROPERTIES[name](step, *question)
     printed = re.findall(r"\{.cmd.*?\}(?=; \{.cmd|$)", str(broken.value))
-    assert set(printed) <= set(sent)
-    assert set(printed) & set(spoilt)
+    assert any(sent[line] for line in printed)
 
 
 @pytest.mark.parametrize("question", [GALLERY, STATIC, BREATHING, LIFT])

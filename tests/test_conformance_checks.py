@@ -7,7 +7,7 @@ from hypothesis import find, settings
 from support.depth import deep_among, deep_but
 from support.faults import FAULTS, HARMLESS
 from support.faulty_readers import refusing_lines
-from support.faulty_steppers import answer_line, faulty
+from support.faulty_steppers import answers_to, faulty
 
 import reference
 from conformance.mutants import COMMON, MUTANTS, PLAIN
@@ -162,7 +162,7 @@ def flow_of(name: str):
     def flow(scene, states, t_end):
         return stepper.flow(scene, states[name == "one-too-few" :], t_end)
 
-    return lambda line: answer_line(line, stepper.step, stepper.trajectory, flow=flow)
+    return lambda line: answers_to([line], stepper.step, stepper.trajectory, flow=flow)
 
 
 # A slow particle is sooner done; 20 particles cannot tell anything from anything.

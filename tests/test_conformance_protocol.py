@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from functools import partial
 from types import SimpleNamespace
 
 import msgspec
@@ -21,7 +22,7 @@ import pytest
 from support import fuzz
 from support.depth import deep_but
 from support.edges import EDGES, LATE_EDGES, REST, is_among
-from support.faulty_steppers import faulty
+from support.faulty_steppers import answers_to, faulty
 from support.schemas import validator
 from test_conformance_suite import made_up
 
@@ -41,7 +42,6 @@ from conformance.suite.session import Limits
 from scene import Horizon
 from scene.load import read_data
 from scene.protocol.messages import Timed
-from scene.protocol.wire import serve
 
 SERVERS = ("reference", "fast", "conformance.plain")
 KITS = ("C++, next hit", "Python, implicit domain", "Python, intersection and reflection")
@@ -207,40 +207,33 @@ def test_what_the_machine_refuses_is_owned_to_and_the_session_goes_on(error, tol
     def refused(*_):
         raise error
 
-    out = io.BytesIO()
-    serve("s", refused, refused, [json.dumps(changed(seq=seq)).encode() + b"\n" for seq in (1, 2)], out)
-    answers = [json.loads(line) for line in out.getvalue().splitlines()]
-    assert answers == [{"seq": seq, "error": told} for seq in (1, 2)]
+    sent = [json.dumps(changed(seq=seq)).encode() + b"\n" for seq in (1, 2)]
+    found = answers_to(sent, refused, refused)
+    assert [json.loads(line) for line in found.splitlines()] == [
+        {"seq": seq, "error": told} for seq in (1, 2)
+    ]
 
 
 N_LINES = int(os.environ.get("MUSHROOMS_LINES", "300"))
 N_RUNS = int(os.environ.get("MUSHROOMS_RUNS", "2"))
 LIMIT = 120.0  # seconds for one line: the time limit of `mushrooms check`
+FAST = {"flow": fast_server.carry, "timer": fast_server.clock}
 IN_PROCESS = {
-    "reference": lambda feed, out: serve(
-        "r", reference_server.step, reference_server.follow, feed, out, timer=reference_server.clock
+    "reference": partial(
+        answers_to, step=reference_server.step, follow=reference_server.follow, timer=reference_server.clock
     ),
-    "fast": lambda feed, out: serve(
-        "f",
-        fast.next_collision,
-        fast_server.follow,
-        feed,
-        out,
-        flow=fast_server.carry,
-        timer=fast_server.clock,
-    ),
-    "plain": lambda feed, out: serve("p", plain.next_collision, plain.trajectory, feed, out, flow=plain.flow),
+    "fast": partial(answers_to, step=fast.next_collision, follow=fast_server.follow, **FAST),
+    "plain": partial(answers_to, step=plain.next_collision, follow=plain.trajectory, flow=plain.flow),
 }
 
 
 @pytest.mark.parametrize("name", IN_PROCESS)
 def test_a_server_answers_every_line_with_one_line(name, tally):
-    IN_PROCESS[name](map(msgspec.json.encode, fuzz.WARM_UP), io.BytesIO())  # compiles
+    IN_PROCESS[name](map(msgspec.json.encode, fuzz.WARM_UP))  # compiles
     for line in fuzz.lines(1, N_LINES, fuzz.requests):
-        out, begin = io.BytesIO(), time.perf_counter()
-        IN_PROCESS[name]([line + b"\n"], out)
+        begin = time.perf_counter()
+        found = IN_PROCESS[name]([line + b"\n"])
         assert time.perf_counter() - begin < LIMIT, line
-        found = out.getvalue()
         assert found.count(b"\n") == bool(line.strip()), (line, found)
         if found:
             answer = json.loads(found)

@@ -9,7 +9,7 @@ import io
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import fast.__main__ as server
@@ -26,10 +26,10 @@ NUMBERS = ("t", "x", "y", "vx", "vy")
 OPEN = {"outcome": "undecided", "reason": "too long"}
 
 
-def answer_line(line: bytes, step: Any, follow: Any, **options: Any) -> bytes:
-    """Answer a line of the protocol by steppers, as a process does."""
+def answers_to(lines: Iterable[bytes], step: Any, follow: Any, **options: Any) -> bytes:
+    """Answer lines of the protocol by steppers, as a process does."""
     out = io.BytesIO()
-    serve("faulty", step, follow, [line], out, **options)
+    serve("faulty", step, follow, lines, out, **options)
     return out.getvalue()
 
 
@@ -37,7 +37,7 @@ def honest(request: Line) -> Line:
     """Answer as the fast stepper does."""
     line = request["line"] if "line" in request else json.dumps(request)
     engines = {"flow": server.carry, "timer": server.clock}
-    found = answer_line(line.encode(), next_collision, server.follow, **engines)
+    found = answers_to([line.encode()], next_collision, server.follow, **engines)
     return json.loads(found)  # type: ignore[no-any-return]
 
 

@@ -289,25 +289,26 @@ def asked_of(name, number):
     return certified_draw(FAMILIES[name], "tests", number)
 
 
-def assert_right_steppers_pass(vector):
-    for steppers in (
-        (fast.next_collision, follow, carry),
-        (plain.next_collision, plain.trajectory, plain.flow),
-    ):
-        found = grade(vector, vectors.answer(vector, *steppers))
-        assert found.verdict == "pass", (vector, found)
+def questions_of(name):
+    """Return questions of a row, or of a run by its seed and their number."""
+    return (
+        [asked_of(name, number) for number in (1, 2, 3)] if isinstance(name, str) else asked_in_a_run(*name)
+    )
 
 
-@pytest.mark.parametrize("some", deep_but([(1, SOME), (1, ROUND), (2, ROUND)], (1, SOME)))
-def test_right_steppers_pass(some):
-    for vector in asked_in_a_run(*some):
-        assert_right_steppers_pass(vector)
+RIGHT = (
+    (fast.next_collision, follow, carry),
+    (plain.next_collision, plain.trajectory, plain.flow),
+)
+USUAL = (1, SOME), "returning-stem-left", "thin-ring"
 
 
-@pytest.mark.parametrize("name", deep_but(DEALT, "returning-stem-left", "thin-ring"))
-def test_right_steppers_pass_each_row(name):
-    for number in (1, 2, 3):
-        assert_right_steppers_pass(asked_of(name, number))
+@pytest.mark.parametrize("name", deep_but([(1, SOME), (1, ROUND), (2, ROUND), *DEALT], *USUAL))
+def test_right_steppers_pass(name):
+    for vector in questions_of(name):
+        for steppers in RIGHT:
+            found = grade(vector, vectors.answer(vector, *steppers))
+            assert found.verdict == "pass", (vector, found)
 
 
 def test_every_round_holds_each_row_as_often_as_its_weight_says():

@@ -109,7 +109,8 @@ def tally(request: pytest.FixtureRequest) -> Iterator[Counter[str]]:
     counts: Counter[str] = Counter()
     yield counts
     line = f"{request.node.name}: " + ", ".join(f"{name} {n}" for name, n in counts.items())
-    request.node.user_properties.append(("tally", line))  # with the report it travels from any worker
+    if counts:
+        request.node.user_properties.append(("tally", line))  # with the report it travels from any worker
 
 
 @pytest.fixture

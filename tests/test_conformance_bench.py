@@ -410,8 +410,6 @@ def test_one_path_is_followed_for_its_length(engine):
     workload = workload_of("moving-cap-1e4", 0)
     asked = baselines.questions(workload.scene, [workload.questions[0].state])
     assert engine.follow(asked, math.inf, 50, 3)[0] == 150
-    last = max(q.state.t for q in workload.questions)
-    assert 10 * (workload.end(100.0) - last) == pytest.approx(workload.end() - last)
     n_hits, seconds = engine.follow(asked, workload.end(100.0), 10_000, 1)
     assert 50 < n_hits < 5000  # it may hop along the arc
     assert 0 < seconds < 1

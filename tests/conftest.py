@@ -22,6 +22,7 @@ from support.entries import kept_entries
 
 import fast
 from conformance.suite import run as suite
+from conformance.vectors import Vector, load
 from mushrooms.main import run
 from scene import Scene
 
@@ -103,6 +104,12 @@ def _few_fresh_questions() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(suite, "N_FRESH", dict.fromkeys(suite.N_FRESH, 3))
         yield
+
+
+@pytest.fixture(scope="session")
+def corpus() -> list[Vector]:
+    """Return all vectors."""
+    return load("stress")
 
 
 @pytest.fixture

@@ -299,11 +299,6 @@ MOST_BYTES = 15e6
 FIRST, SECOND = "moving-cap.jsonl", "untilted.jsonl"
 
 
-@pytest.fixture(scope="module")
-def corpus():
-    return vectors.load("stress")
-
-
 def test_what_the_corpus_holds(corpus, tally):
     tally.update(f"{vector.level} {vector.kind}" for vector in corpus)
     assert len({vector.id for vector in corpus}) == len(corpus)

@@ -406,11 +406,6 @@ def test_a_particle_that_is_lost_after_its_capture_has_no_interval(monkeypatch):
 GROUPS = ("moving-cap", "horizon")
 
 
-@pytest.fixture(scope="module")
-def corpus():
-    return vectors.load("stress")
-
-
 @pytest.mark.parametrize("sample", deep_but([(1, 20), (1, 5), (2, 5)], (1, 20)))
 def test_the_fast_stepper_answers_as_well_after_a_transform(sample, corpus, tally):
     seed, every = sample

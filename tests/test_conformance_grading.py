@@ -16,7 +16,7 @@ from support.truth import certified_answer, is_delicate, proved_step
 
 import fast
 import reference
-from conformance import plain, vectors
+from conformance import plain
 from conformance.cases.attacks import stepped
 from conformance.grading.agreement import Enclosed, compare, middle, physics_bound
 from conformance.grading.grade import grade, precision_class
@@ -433,11 +433,6 @@ def test_backward_ulps_of_known_errors():
 )
 def test_precision_class(ulps, reached):
     assert precision_class(ulps) == reached
-
-
-@pytest.fixture(scope="module")
-def corpus() -> list[Vector]:
-    return vectors.load("stress")
 
 
 def test_exact_answers_pass_within_an_ulp(corpus):

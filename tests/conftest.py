@@ -22,6 +22,7 @@ from support.entries import kept_entries
 
 import fast
 from conformance.suite import run as suite
+from conformance.vectors import Vector, load
 from mushrooms.main import run
 from scene import Scene
 
@@ -39,22 +40,22 @@ LONGEST = [
     "test_mushrooms_bench.py",
     "test_fast_lane_search.py",
     "test_mushrooms_check.py",
-    "test_conformance_generated.py",
-    "test_conformance_agreement.py",
-    "test_conformance_suite.py",
-    "test_conformance_audit.py",
+    "test_conformance_checks.py",
     "test_conformance_protocol.py",
+    "test_conformance_verify.py",
+    "test_conformance_suite.py",
+    "test_reference_mutants.py",
+    "test_conformance_generated.py",
+    "test_conformance_audit.py",
     "test_scene_validity.py",
     "test_mushrooms_scale.py",
-    "test_reference_mutants.py",
+    "test_conformance_strategies.py",
+    "test_conformance_cases.py",
+    "test_conformance_grading.py",
     "test_conformance_properties.py",
     "test_theory_distribution.py",
     "test_conformance_bench.py",
-    "test_conformance_session.py",
     "test_theory_large_deviations.py",
-    "test_conformance_mutants.py",
-    "test_conformance_vectors.py",
-    "test_conformance_grading.py",
     "test_scene_mixed.py",
     "test_fast_stays.py",
 ]
@@ -105,13 +106,20 @@ def _few_fresh_questions() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session")
+def corpus() -> list[Vector]:
+    """Return all vectors."""
+    return load("stress")
+
+
 @pytest.fixture
 def tally(request: pytest.FixtureRequest) -> Iterator[Counter[str]]:
     """Count what a test looked at; the counts are printed in the terminal summary."""
     counts: Counter[str] = Counter()
     yield counts
     line = f"{request.node.name}: " + ", ".join(f"{name} {n}" for name, n in counts.items())
-    request.node.user_properties.append(("tally", line))  # with the report it travels from any worker
+    if counts:
+        request.node.user_properties.append(("tally", line))  # with the report it travels from any worker
 
 
 @pytest.fixture

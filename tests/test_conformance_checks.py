@@ -2,13 +2,12 @@
 
 from contextlib import nullcontext
 
-import msgspec
 import pytest
 from hypothesis import find, settings
 from support.depth import deep_among, deep_but
 from support.faults import FAULTS, HARMLESS
 from support.faulty_readers import refusing_lines
-from support.faulty_steppers import faulty
+from support.faulty_steppers import answers_to, faulty
 
 import reference
 from conformance.mutants import COMMON, MUTANTS, PLAIN
@@ -18,7 +17,7 @@ from conformance.suite.checks import ensembles, refusals, timing
 from conformance.suite.checks.flows import MAX_STATES
 from conformance.suite.checks.form import Draw, octaves, run_check
 from conformance.suite.session import Session
-from scene import BadInput, Cap, Horizon, Mushroom, Rejected, State, Stem, from_data
+from scene import BadInput, Cap, Mushroom, Rejected, State, Stem, from_data
 
 SEEDS = 1, 2, 3
 UNTIMED = [check for check in checks.checks_of() if not check.name.startswith(("profile", "promise/time"))]
@@ -157,20 +156,13 @@ def test_no_size_is_a_constant():
 
 
 def flow_of(name: str):
-    """Answer flows by a mutant of the plain stepper, or by itself, or of all particles but one."""
+    """Answer by a mutant of the plain stepper, or by itself, or of all particles of a flow but one."""
     stepper = (MUTANTS | COMMON | dict.fromkeys(("none", "one-too-few"), PLAIN))[name]
 
-    def change(request, answer):
-        if request.get("cmd") != "flow":
-            return answer(request)
-        states = [State(**state) for state in request["states"]][name == "one-too-few" :]
-        found = stepper.flow(from_data(request["scene"]), states, request["t_end"])
-        told = [
-            {**msgspec.to_builtins(o), "captured": s if isinstance(o, Horizon) else None} for o, s in found
-        ]
-        return {"seq": request["seq"], "states": told}
+    def flow(scene, states, t_end):
+        return stepper.flow(scene, states[name == "one-too-few" :], t_end)
 
-    return faulty(change)
+    return lambda line: answers_to([line], stepper.step, stepper.trajectory, flow=flow)
 
 
 # A slow particle is sooner done; 20 particles cannot tell anything from anything.

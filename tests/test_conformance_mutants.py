@@ -9,15 +9,15 @@ from support.depth import deep_but
 from conformance.mutants import COMMON, MUTANTS, PLAIN, kill_matrix
 from conformance.mutants.kill_matrix import diagnose, kills, page, verdict
 from conformance.mutants.mutant import make_mutant
-from conformance.vectors import load, manifest
+from conformance.vectors import manifest
 
 DOCS = Path(__file__).parent.parent / "docs"
 PUBLISHED = json.loads((kill_matrix.DATA / "kill-matrix.json").read_text("utf-8"))
 
 
 @pytest.fixture(scope="module")
-def vectors():
-    return {vector.id: vector for vector in load("stress")}
+def vectors(corpus):
+    return {vector.id: vector for vector in corpus}
 
 
 def test_the_matrix_is_of_these_mutants_and_this_corpus():

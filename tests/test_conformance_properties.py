@@ -79,22 +79,19 @@ SLANTED = (Stem(w=1.0, h=1.0, slope=0.25), State(0.5, 0.1, -0.5, -2.0, 0.25), 9.
 def test_the_questions_of_a_broken_property_are_those_that_were_sent(name):
     """The question as it was given does not repeat a failure of its image: of a slope sent as a law, say."""
     question = SLANTED if name == "static-limit" else BREATHING
-    sent, spoilt = [], []
+    sent = {}
 
     def step(scene, state, t_end):
-        line = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
-        sent.append(json.dumps({"cmd": "step", "seq": 1, **line}))
+        asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
+        line, is_image = json.dumps({"cmd": "step", "seq": 1, **asked}), (scene, state, t_end) != question
+        sent[line] = is_image
         found = plain.next_collision(scene, state, t_end)
-        if (scene, state, t_end) == question:
-            return found
-        spoilt.append(sent[-1])
-        return replace(found, vx=1.01 * found.vx)
+        return replace(found, vx=1.01 * found.vx) if is_image else found
 
     with pytest.raises(AssertionError) as broken:
         PROPERTIES[name](step, *question)
     printed = re.findall(r"\{.cmd.*?\}(?=; \{.cmd|$)", str(broken.value))
-    assert set(printed) <= set(sent)
-    assert set(printed) & set(spoilt)
+    assert any(sent[line] for line in printed)
 
 
 @pytest.mark.parametrize("question", [GALLERY, STATIC, BREATHING, LIFT])
@@ -188,23 +185,19 @@ NO_OUTCOMES = {
     "a text": lambda c: replace(c, x="0.5"),
     "an integer beyond all floats": lambda c: replace(c, t=10**400),
     "a horizon nowhere": lambda c: Horizon(c.t, math.nan, c.y, c.vx, c.vy),
+    "a refusal of a state clearly inside": lambda _: Rejected("no"),
 }
 
 
 @pytest.mark.parametrize("name", PROPERTIES)
-@pytest.mark.parametrize("no_outcome", NO_OUTCOMES.values(), ids=NO_OUTCOMES)
-def test_what_is_no_outcome_is_refused(name, no_outcome):
+@pytest.mark.parametrize("no_outcome", NO_OUTCOMES)
+@pytest.mark.parametrize("question", [GALLERY, LIFT], ids=["cap", "stem"])
+def test_what_is_no_outcome_is_refused(name, no_outcome, question):
     """It is nothing to compare: a stepper that forgets to return would hold every property."""
     with pytest.raises(AssertionError) as refusal:
-        PROPERTIES[name](lambda *question: no_outcome(plain.next_collision(*question)), *LIFT)
+        PROPERTIES[name](lambda *asked: NO_OUTCOMES[no_outcome](plain.next_collision(*asked)), *question)
     assert re.fullmatch(r"outcome: .*, must be .*; \{\"cmd\": \"step\".*\}", str(refusal.value))
-
-
-@pytest.mark.parametrize("name", PROPERTIES)
-@pytest.mark.parametrize("question", [GALLERY, LIFT], ids=["cap", "stem"])
-def test_refusing_every_state_holds_no_property(name, question):
-    with pytest.raises(AssertionError, match=r"outcome: .*must be no refusal of a state clearly inside"):
-        PROPERTIES[name](lambda *_: Rejected("no"), *question)
+    assert ("no refusal of a state clearly inside" in str(refusal.value)) == ("a refusal" in no_outcome)
 
 
 def test_what_is_clearly_inside_is_refused_by_nobody(tally):

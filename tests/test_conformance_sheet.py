@@ -8,6 +8,7 @@ import subprocess
 import msgspec
 import pytest
 from support.depth import deep_but
+from support.faulty_steppers import answers_to
 from support.refusals import assert_refused
 
 from conformance import plain, vectors
@@ -18,7 +19,6 @@ from conformance.suite import sheet_files as files
 from conformance.suite.checks import ensembles
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
-from scene.protocol.wire import serve
 from scene.refusal import BadInput
 
 SEED = 5
@@ -73,7 +73,6 @@ def test_questions_in_files_hang_on_no_answer(name, sheet, tmp_path, monkeypatch
 
 def answered(lines: bytes, step=plain.next_collision) -> bytes:
     """Answer a file of questions as a program does that reads standard input."""
-    out = io.BytesIO()
 
     def follow(scene, state, n, t_end):
         return plain.trajectory(scene, state, n, t_end, step)
@@ -81,8 +80,7 @@ def answered(lines: bytes, step=plain.next_collision) -> bytes:
     def carry(scene, states, t_end):
         return plain.flow(scene, states, t_end, step)
 
-    serve("plain", step, follow, io.BytesIO(lines), out, flow=carry)
-    return out.getvalue()
+    return answers_to(lines.splitlines(keepends=True), step, follow, flow=carry)
 
 
 def off_by(part):

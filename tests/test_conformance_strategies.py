@@ -73,55 +73,48 @@ N_SESSIONS, N_EACH = 30, 30
 N_DRAWN = N_SESSIONS * N_EACH
 
 
-def lengths(scene):
-    return [bounds(law) for name, law in laws_of(scene).items() if name in ("r", "w", "h")]
-
-
-def features_of_laws(scene):
-    found = laws_of(scene)
+def features(scene, state, t_end):
+    """Name what tables and laws there are, what a state is near to, how it flies, and when."""
+    found, flight = laws_of(scene), Flight(scene, state, t_end)
     moving = [law for law in found.values() if not is_constant(law)]
-    yield type(scene).__name__
-    yield f"laws: {type(moving[0]).__name__ if moving else 'static'}"
-    if isinstance(scene, Mushroom):
-        yield "mouth: w" if scene.nu is None else "mouth: nu"
-    if "slope" in found:
-        slope = found["slope"]
-        yield f"slope: {'moving' if not isinstance(slope, float) else (slope > 0) - (slope < 0)}"
-    for law in moving:
-        n = max(k for k, _, _ in law.harmonics()) if isinstance(law, Fourier) else len(law.knots) - 1
-        yield f"harmonics: {n}" if isinstance(law, Fourier) else f"legs: {n if n < 5 else 'many'}"
-    size = max(max(abs(b.lowest), abs(b.highest)) for b in lengths(scene))
-    yield f"size: {'small' if size < 2.0**-10 else 'large' if size > 2.0**10 else 'usual'}"
-
-
-def features_of_start(scene, state, t_end):
-    """Name what a state is near to, how it flies, and when."""
-    flight, longest = (
-        Flight(scene, state, t_end),
-        max(max(abs(b.lowest), abs(b.highest)) for b in lengths(scene)),
-    )
+    waves = [law for law in moving if isinstance(law, Fourier)]
+    legs = [len(law.knots) - 1 for law in moving if isinstance(law, BangBang)]
+    knots = [t for law in moving if isinstance(law, BangBang) for t, _ in law.knots]
+    slope, cycle, is_mushroom = found.get("slope"), scene.period, isinstance(scene, Mushroom)
+    lengths = [bounds(law) for name, law in found.items() if name in ("r", "w", "h")]
+    longest = max(max(abs(b.lowest), abs(b.highest)) for b in lengths)
     size = max(flight.laws[name].value for name in ("r", "h") if name in flight.laws)
     around = [w for w in flight.walls_near(in_cap=flight.is_in_cap) if w != state.wall]
     n_close = sum(flight.f(w, 0.0)[0] < size * 2.0**-10 * (size if w == "arc" else 1) for w in around)
     speed, distance = math.hypot(state.vx, state.vy), math.hypot(state.x, state.y)
-    fastest = max(b.slope for b in lengths(scene)) or longest
-    cycle = scene.period
-    knots = [t for law in laws_of(scene).values() if isinstance(law, BangBang) for t, _ in law.knots]
+    fastest = max(b.slope for b in lengths) or longest
     grazing = 2.0**-10 * (2 * distance if state.wall == "arc" else 1.0) * speed
-    is_mushroom = isinstance(scene, Mushroom) and state.wall is None
+    is_free = is_mushroom and state.wall is None
     return {
+        type(scene).__name__: True,
+        f"laws: {type(moving[0]).__name__ if moving else 'static'}": True,
+        "mouth: w": is_mushroom and scene.nu is None,
+        "mouth: nu": is_mushroom and scene.nu is not None,
+        "slope: negative": isinstance(slope, float) and slope < 0,
+        "slope: zero": slope == 0,
+        "slope: positive": isinstance(slope, float) and slope > 0,
+        "slope: moving": slope in moving,
+        **{f"harmonics: {max(k for k, _, _ in law.harmonics())}": True for law in waves},
+        **{f"legs: {n if n < 5 else 'many'}": True for n in legs},
+        "size: small": longest < 2.0**-10,
+        "size: large": longest > 2.0**10,
         f"on: {type(scene).__name__} {state.wall}": True,
         "near: wall": n_close >= 1,
         "near: corner": n_close >= (2 if state.wall is None else 1),
-        "near: mouth": is_mushroom and abs(state.y) < size * 2.0**-10,
-        "near: in the mouth": is_mushroom and state.y == 0,
+        "near: mouth": is_free and abs(state.y) < size * 2.0**-10,
+        "near: in the mouth": is_free and state.y == 0,
         "near: centre": distance < size * 2.0**-6,
         f"decade: {math.floor(math.log10(speed / fastest))}": True,
         "waits": t_end > state.t,
         "waits not": t_end == state.t,
         "time: zero": state.t == 0,
         "time: negative": state.t < 0,
-        "time: on a knot": bool(cycle) and any(math.remainder(state.t - t, cycle) == 0 for t in knots),
+        "time: on a knot": any(math.remainder(state.t - t, cycle) == 0 for t in knots),
         "time: late": bool(cycle) and abs(state.t) > 100 * cycle,
         "flies: along an axis": 0.0 in (state.vx, state.vy),
         "flies: grazing": state.wall is not None and flight.f(state.wall, 0.0)[1] < grazing,
@@ -134,7 +127,7 @@ LEAST = {
     **dict.fromkeys(["laws: static", "laws: Fourier", "laws: BangBang"], N_DRAWN // 20),
     **{f"on: {t.__name__} {wall}": 5 for t in (Cap, Stem, Mushroom) for wall in (None, *t.walls)},
     **dict.fromkeys(["mouth: w", "mouth: nu"], 25),
-    **dict.fromkeys(["slope: -1", "slope: 0", "slope: 1", "slope: moving"], 10),
+    **{f"slope: {how}": 10 for how in ("negative", "zero", "positive", "moving")},
     **{f"harmonics: {n}": 5 for n in (1, 2, 3)},
     **{f"legs: {n}": 5 for n in (2, 3, 4, "many")},
     **dict.fromkeys(["size: small", "size: large"], 1),
@@ -150,8 +143,7 @@ def test_every_kind_of_scene_and_start_is_reached():
     counts: Counter[str] = Counter()
 
     def collect(step):
-        counts.update(features_of_laws(step[0]))
-        counts.update(name for name, is_so in features_of_start(*step).items() if is_so)
+        counts.update(name for name, is_so in features(*step).items() if is_so)
 
     for number in range(N_SESSIONS):
         session = settings(max_examples=N_EACH, database=None, derandomize=False)

@@ -10,17 +10,22 @@ from fractions import Fraction
 
 import mpmath
 import pytest
+from support import faulty_references as faults
 from support.answers_by_hand import ANSWERS
 from support.depth import deep_among
-from support.faulty_references import MUTANTS
 from support.tables import BREATHING, LEAP
 
 import reference
 from conformance.cases.delicate_families import sunk
-from reference.arithmetic import MAX_WORK, Arithmetic
+from reference import chain, rational, start, timeline, walls
+from reference.arithmetic import MAX_WORK, Arithmetic, sign
+from reference.course import SIDES, Course
 from reference.isolation import Isolator
-from reference.timeline import law_in_time
-from scene import BangBang, Cap, Fourier, Mushroom, Rejected, State, Stem, Undecided, Undefined
+from reference.jets import Jet
+from reference.timeline import Legs, law_in_time
+from reference.walls import MovingWalls
+from reference.waves import Waves
+from scene import BangBang, Cap, Fourier, InvalidState, Mushroom, Rejected, State, Stem, Undecided, Undefined
 from scene.laws import value
 from scene.tables import laws
 
@@ -288,6 +293,196 @@ BATTERY = (
 @pytest.mark.parametrize("check", BATTERY)
 def test_the_reference_passes(check):
     check()
+
+
+@faults.replacing(Isolator, "first_root")
+def skip_the_first_root(honest, self, start, end):
+    root = honest(self, start, end)
+    if root is None:
+        return None
+    for i in range(1, 65):  # from where f > 0 again
+        later = self.arithmetic.middle(root.time + (end - root.time) * self.arithmetic.number(i) / 65)
+        if self.value(later) > 0:
+            return honest(self, later, end)
+    return None
+
+
+@faults.replacing(Course, "_first_hit")
+def exclude_nothing(honest, self, walls, start, limit):
+    """The first wall in the list that is hit at all, others not asked."""
+    for wall in walls:
+        found = honest(self, (wall,), start, limit)
+        if found is not None:
+            return found
+    return None
+
+
+@faults.replacing(Course, "_first_hit")
+def exclude_all_but_the_floor(honest, self, walls, start, limit):
+    return honest(self, tuple(wall for wall in walls if wall != "floor") or walls, start, limit)
+
+
+@faults.replacing(Legs, "jet")
+def piece_in_the_middle(honest, self, s):
+    """Of the pieces that an enclosed time may touch, the one in its middle is believed."""
+    if s.delta == 0 or s.delta > 2.0**-10:
+        return honest(self, s)
+    middle = honest(self, self.arithmetic.middle(s))
+    return Jet(middle.f + s.delta * middle.d1, middle.d1 + s.delta * middle.d2, middle.d2)
+
+
+@faults.replacing(Isolator, "__init__")
+def keep_the_residual(honest, self, arithmetic, jet, begin, residual=None, **options):
+    honest(self, arithmetic, jet, begin, None, **options)
+
+
+@faults.replacing(Course, "_beyond_crossing")
+def edge_with_the_residual(honest, self, crossing):
+    leaving, self.leaving = self.leaving, {}
+    try:
+        return honest(self, crossing)
+    finally:
+        self.leaving = leaving
+
+
+@faults.replacing(Course, "_beyond_crossing")
+def width_at_departure(honest, self, crossing):
+    self.motion.width = lambda s: MovingWalls.width(self.motion, self.arithmetic.zero if s is crossing else s)
+    return honest(self, crossing)
+
+
+@faults.replacing(Course, "__init__")
+def with_a_later_horizon(honest, self, scene, motion, leaving, is_flat, in_cap, end, exact):
+    honest(self, scene, motion, leaving, is_flat, in_cap, None if end is None else end + 9, exact)
+
+
+@faults.replacing(Course, "_beyond_crossing")
+def open_always(honest, self, crossing):
+    if not isinstance(self.scene, Mushroom):
+        return honest(self, crossing)
+    walls = SIDES if self.in_cap else ("arc",)
+    return self._first_hit(walls, self.arithmetic.lower(crossing), None)
+
+
+@faults.replacing(chain, "reflect")
+def with_the_wall_reversed(honest, course, hit):
+    f_t = course.motion.gradient(hit.wall, hit.time)[2]
+    return honest(course, hit._replace(slope=hit.slope - 2 * f_t))
+
+
+@faults.replacing(MovingWalls, "wall")
+def swapped_sides(honest, self, wall, s):
+    return honest(self, {"left": "right", "right": "left"}.get(wall, wall), s)
+
+
+@faults.replacing(MovingWalls, "gradient")
+def level_normal(honest, self, wall, s):
+    f_x, f_y, f_t = honest(self, wall, s)
+    return f_x, self.arithmetic.zero if wall in ("left", "right") else f_y, f_t
+
+
+@faults.replacing(MovingWalls, "law")
+def still_slope(honest, self, name, s):
+    jet = honest(self, name, s)
+    return Jet(jet.f, None, None) if name == "slope" else jet
+
+
+@faults.replacing(MovingWalls, "width")
+def width_with_still_nu(honest, self, s):
+    if "nu" not in self.timeline.laws:
+        return honest(self, s)
+    nu, r = self.law("nu", s), self.law("r", s)
+    return Jet(nu.f * r.f, None if r.d1 is None else nu.f * r.d1, None)
+
+
+@faults.replacing(walls, "square")
+def square_without_second_derivative(honest, arithmetic, p):
+    if p.d1 is None:
+        return Jet(arithmetic.square(p.f), None, None)
+    return Jet(arithmetic.square(p.f), 2 * (p.f * p.d1), 2 * arithmetic.square(p.d1))
+
+
+@faults.replacing(MovingWalls, "hessian")
+def hessian_without_time(honest, self, wall, s):
+    zero = self.arithmetic.zero
+    two = self.arithmetic.number(-2)
+    return (two, two, zero, zero) if wall == "arc" else (zero, zero, zero, zero)
+
+
+@faults.replacing(start, "_judge_on_base")
+def base_without_an_end(honest, scene, state, motion):
+    """The arc is asked only whether the state is surely beyond it."""
+    if sign(motion.wall("arc", motion.arithmetic.zero).f) < 0:
+        raise InvalidState("beyond wall arc")
+    return Undefined("sliding") if state.vy == 0 else None
+
+
+@faults.replacing(Waves, "_powers")
+def powers_of_later_times(honest, self, away):
+    """As if the point of the expansion were the interval's begin."""
+    later = self.arithmetic.hull(self.arithmetic.zero, away)
+    return honest(self, later)
+
+
+@faults.replacing(timeline.Timeline, "__init__")
+def half_a_turn(honest, self, arithmetic, scene, instant):
+    honest(self, arithmetic, scene, instant)
+    self.turn = None if self.turn is None else self.turn / 2
+
+
+@faults.replacing(Waves, "__init__")
+def waves_without_a_remainder(honest, self, arithmetic, law, instant):
+    honest(self, arithmetic, law, instant)
+    self.bound = arithmetic.zero
+
+
+@faults.replacing(Isolator, "_expanded")
+def tangent_for_the_expansion(honest, self, whole, jet):
+    """Without the second derivative's part."""
+    return honest(self, whole, jet._replace(d2=self.arithmetic.zero))._replace(d2=jet.d2)
+
+
+MUTANTS = {
+    "waves without a remainder": waves_without_a_remainder,
+    "odd powers of a negative time dropped": powers_of_later_times,
+    "never reached from the first place": faults.swept_begins_alone,
+    "never met in half a period": half_a_turn,
+    "f by its tangent": tangent_for_the_expansion,
+    "cut where nothing rises": faults.replacing(Isolator, "_require_rise")(
+        lambda honest, self, a, b, cut: None
+    ),
+    "first root skipped": skip_the_first_root,
+    "first wall in the list wins": exclude_nothing,
+    "floor never asked": exclude_all_but_the_floor,
+    "piece at the lower end of an enclosed time": faults.knots_unseen,
+    "piece in the middle of an enclosed time": piece_in_the_middle,
+    "sums of cosines are 0 by their factors alone": faults.replacing(rational, "_is_zero_sum")(
+        lambda honest, factors: not factors
+    ),
+    "ties with the residual": faults.tie_with_the_residual,
+    "mouth's edge with the residual": edge_with_the_residual,
+    "met at the horizon is met": faults.hit_at_end_counts,
+    "a start is on one wall at most": faults.corner_unseen,
+    "a base without an end": base_without_an_end,
+    "no limit to the work": faults.replacing(Arithmetic, "spend")(lambda honest, self, units: None),
+    "mouth's width at departure": width_at_departure,
+    "mouth always open": open_always,
+    "base always closed": faults.replacing(Course, "_beyond_crossing")(
+        lambda honest, self, crossing: self._base_hit(crossing)
+    ),
+    "residual kept": keep_the_residual,
+    "wall velocity reversed in the bounce": with_the_wall_reversed,
+    "half the kick": faults.replacing(chain, "reflect")(
+        lambda honest, course, hit: honest(course, hit._replace(slope=hit.slope / 2))
+    ),
+    "left and right swapped": swapped_sides,
+    "normal of a slanted side level": level_normal,
+    "slope's derivative dropped": still_slope,
+    "product rule of nu r dropped": width_with_still_nu,
+    "r r'' dropped": square_without_second_derivative,
+    "second derivatives by time dropped": hessian_without_time,
+    "horizon overrun": with_a_later_horizon,
+}
 
 
 @pytest.mark.parametrize("name", deep_among(MUTANTS, "half the kick", "no limit to the work"))

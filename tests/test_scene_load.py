@@ -8,18 +8,35 @@ import sys
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.fuzz import as_toml
+from support import fuzz
 from support.schemas import validator
 
 from conformance.strategies import scenes
-from scene import InvalidScene, catalogue, from_data, load, to_data
+from scene import BadInput, InvalidScene, catalogue, from_data, load, to_data
 from scene.load import read_data
 
+N_FILES = int(os.environ.get("MUSHROOMS_LINES", "300"))  # of each kind
 CAP = {"table": "cap", "r": 1.0}
 STEM = {"table": "stem", "w": 1.0, "h": 1.0}
 MUSHROOM = {"table": "mushroom", "r": 1.0, "h": 1.0, "nu": 0.5}
 FOURIER = {"kind": "fourier", "mean": 1.0, "omega": 1.0}
 LEGS = {"kind": "bang-bang", "knots": [[0.0, 1.0], [1.0, 1.0]]}
+
+
+def as_toml(line):
+    """Write a line of JSON as TOML; what is garbled stays as it is."""
+    try:
+        data = json.loads(line)
+        lines = [f"{json.dumps(key)} = {inline(value)}" for key, value in data.items()]
+    except (ValueError, AttributeError, RecursionError):
+        return line
+    return "\n".join(lines).encode("utf-8", "surrogatepass")
+
+
+def inline(value):
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {inline(part)}" for key, part in value.items()) + "}"
+    return "[" + ", ".join(map(inline, value)) + "]" if isinstance(value, list) else json.dumps(value)
 
 
 @given(scenes())
@@ -185,6 +202,22 @@ def test_junk_is_refused_or_loads_but_never_crashes(data, field, entry):
         refusal = str(error)
     assert len(refusal.splitlines()) == 1
     assert scene is None or from_data(to_data(scene)) == scene
+
+
+@pytest.mark.parametrize("suffix", [".json", ".toml"])
+def test_a_scene_file_is_read_or_refused_in_one_line(suffix, tmp_path, tally):
+    """Files with values, keys or bytes spoilt at random."""
+    path = tmp_path / f"scene{suffix}"
+    for line in fuzz.lines(3, N_FILES, lambda draw: draw.choice(fuzz.SCENES)):
+        path.write_bytes(line if suffix == ".json" else as_toml(line))
+        refusal = ""
+        try:
+            load(str(path))
+        except BadInput as error:
+            refusal = str(error)
+        assert "\n" not in refusal, line
+        tally["refused" if refusal else "read"] += 1
+    assert min(tally["refused"], tally["read"]) > N_FILES / 20
 
 
 def test_a_law_nested_too_deep_is_refused():

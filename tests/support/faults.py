@@ -1,14 +1,15 @@
 """The one table of faulty steppers: the check that refuses each, the verdict, the fault."""
 
 import math
-import operator
 from functools import partial
 from itertools import count
+from operator import eq, gt, itemgetter
 
 from support.faulty_readers import (
     answer_by,
     as_fortran_reads,
     at_bad_lines,
+    by_laws,
     crash,
     everywhere,
     excused,
@@ -34,7 +35,6 @@ from support.faulty_readers import (
     refusing_starts,
     rounded,
     scene_by,
-    scene_kept,
     scenes_refused_for,
     slower,
     strictly_off,
@@ -45,7 +45,6 @@ from support.faulty_readers import (
     whole,
     wide_by_ranges,
     without,
-    without_depth,
     without_wall,
     wrong_after_bad_lines,
 )
@@ -59,7 +58,6 @@ from support.faulty_steppers import (
     asked,
     beside_its_wall,
     both,
-    by,
     captured_as,
     clock,
     dead_time,
@@ -146,21 +144,33 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     },
     "answers-without-wall": ("changed-questions", "fail", on(STEP, answer_by, key=without_wall, book={})),
     **{
-        f"scenes-{name}": ("changed-questions", "fail", asked(scene_by, STEP, key=key, book={}))
+        f"scenes-{name}": ("changed-questions", "fail", asked(scene_by, STEP, key=by_laws(key), book={}))
         for name, key in KEYS.items()
     },
-    "paths-by-first-parts": ("changed-questions", "fail", asked(scene_by, PATH, key=first_parts, book={})),
-    "flows-by-first-parts": ("changed-questions", "fail", asked(scene_by, FLOW, key=first_parts, book={})),
+    "paths-by-first-parts": (
+        "changed-questions",
+        "fail",
+        asked(scene_by, PATH, key=by_laws(first_parts), book={}),
+    ),
+    "flows-by-first-parts": (
+        "changed-questions",
+        "fail",
+        asked(scene_by, FLOW, key=by_laws(first_parts), book={}),
+    ),
     "scenes-by-name": (
         "changed-questions",
         "fail",
-        asked(scene_kept, key=lambda scene: scene.get("name") or scene, book={}),
+        asked(scene_by, key=lambda scene: scene.get("name") or scene, book={}),
     ),
-    "scenes-without-depth": ("changed-questions", "fail", asked(scene_kept, key=without_depth, book={})),
+    "scenes-without-depth": (
+        "changed-questions",
+        "fail",
+        asked(scene_by, key=without("h", "slope"), book={}),
+    ),
     "scenes-without-names": (
         "changed-questions",
         "fail",
-        asked(scene_by, STEP, key=without(), book={}, are_named=False),
+        asked(scene_by, STEP, key=by_laws(without(), are_named=False), book={}),
     ),
     # Flows.
     "one-bad-spoils-all": ("many-particles", "fail", on(FLOW, one_bad_spoils_all)),
@@ -191,9 +201,17 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     "first-for-all": ("many-particles", "fail", on(FLOW, same_velocity_for_all)),
     "first-time-for-all": ("many-particles", "fail", asked(same_time_for_all, FLOW)),
     **{f"room-for-{n}": ("many-particles", "fail", on(FLOW, room_for, n=n)) for n in (64, 256, 500, 2000)},
-    "particles-without-time": ("many-particles", "fail", on(FLOW, particles_by, key=by(*PLACE, "wall"))),
-    "particles-without-wall": ("many-particles", "fail", on(FLOW, particles_by, key=by("t", *PLACE))),
-    "particles-by-place": ("many-particles", "fail", on(FLOW, particles_by, key=by("t", "x", "y", "wall"))),
+    "particles-without-time": (
+        "many-particles",
+        "fail",
+        on(FLOW, particles_by, key=itemgetter(*PLACE, "wall")),
+    ),
+    "particles-without-wall": ("many-particles", "fail", on(FLOW, particles_by, key=itemgetter("t", *PLACE))),
+    "particles-by-place": (
+        "many-particles",
+        "fail",
+        on(FLOW, particles_by, key=itemgetter("t", "x", "y", "wall")),
+    ),
     "particles-by-9-digits": ("many-particles", "fail", on(FLOW, particles_by, key=rounded(9))),
     "swapped-now-and-then": ("many-particles", "fail", on(FLOW, swapping, numbers=count(1))),
     **{
@@ -310,11 +328,11 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     **{f"impatient-after-{n}": ("waiting", "fail", on(STEP, impatient, periods=n)) for n in (512, 1000)},
     # Bad input, and good.
     **{name: ("bad-states", "fail", excused(excuse, STEP)) for name, excuse in EXCUSES.items()},
-    "no-time-no-check": ("bad-states", "fail", unchecked(operator.eq, STEP)),
+    "no-time-no-check": ("bad-states", "fail", unchecked(eq, STEP)),
     "loose-paths": ("bad-states", "fail", excused(loose(1e-2), PATH)),
     "loose-flows": ("bad-states", "fail", excused(loose(1e-2), FLOW)),
-    "late-is-arrived": ("bad-states", "fail", unchecked(operator.gt, FLOW)),
-    "at-the-end-unchecked": ("bad-states", "fail", unchecked(operator.eq, FLOW)),
+    "late-is-arrived": ("bad-states", "fail", unchecked(gt, FLOW)),
+    "at-the-end-unchecked": ("bad-states", "fail", unchecked(eq, FLOW)),
     "no-base-in-the-mouth": ("bad-states", "fail", refusing_starts(in_the_mouth)),
     "no-base-in-the-mouth-of-paths": ("bad-states", "fail", refusing_starts(in_the_mouth, PATH)),
     **{

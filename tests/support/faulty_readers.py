@@ -133,23 +133,14 @@ def without_wall(request: Line) -> Any:
     return [request["scene"], {**request["state"], "wall": 0}, request["t_end"]]
 
 
-def scene_by(
-    request: Line, *, key: Callable[[Any], Any], book: dict[str, Line], are_named: bool = True
-) -> None:
-    """Keep scenes by their laws' keys, and answer with the first scene of the same key."""
-    laws = request["scene"].items()
-    keys = sorted([name if are_named else "", repr(key(law))] for name, law in laws)
-    request["scene"] = book.setdefault(repr(keys), request["scene"])
-
-
-def scene_kept(request: Line, *, key: Callable[[Line], Any], book: dict[str, Line]) -> None:
-    """Keep scenes by a key of the whole scene, and answer with the first scene of the same key."""
+def scene_by(request: Line, *, key: Callable[[Line], Any], book: dict[str, Line]) -> None:
+    """Keep scenes by a key, and answer with the first scene of the same key."""
     request["scene"] = book.setdefault(repr(key(request["scene"])), request["scene"])
 
 
-def without_depth(scene: Line) -> Line:
-    """Leave out how deep a stem is, and how its sides lean."""
-    return {name: law for name, law in scene.items() if name not in ("h", "slope")}
+def by_laws(key: Callable[[Any], Any], *, are_named: bool = True) -> Callable[[Line], Any]:
+    """Return a key of scenes: the keys of their laws."""
+    return lambda scene: sorted([name if are_named else "", repr(key(law))] for name, law in scene.items())
 
 
 def first_parts(law: Any) -> Any:
@@ -162,7 +153,7 @@ def first_parts(law: Any) -> Any:
 
 
 def without(*fields: str) -> Callable[[Any], Any]:
-    """Leave fields of a law out."""
+    """Leave fields of a law or a scene out."""
     return lambda law: {k: v for k, v in law.items() if k not in fields} if isinstance(law, dict) else law
 
 

@@ -9,7 +9,7 @@ import io
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import fast.__main__ as server
@@ -26,14 +26,19 @@ NUMBERS = ("t", "x", "y", "vx", "vy")
 OPEN = {"outcome": "undecided", "reason": "too long"}
 
 
+def answers_to(lines: Iterable[bytes], step: Any, follow: Any, **options: Any) -> bytes:
+    """Answer lines of the protocol by steppers, as a process does."""
+    out = io.BytesIO()
+    serve("faulty", step, follow, lines, out, **options)
+    return out.getvalue()
+
+
 def honest(request: Line) -> Line:
     """Answer as the fast stepper does."""
-    out = io.BytesIO()
     line = request["line"] if "line" in request else json.dumps(request)
-    serve(
-        "faulty", next_collision, server.follow, [line.encode()], out, flow=server.carry, timer=server.clock
-    )
-    return json.loads(out.getvalue())  # type: ignore[no-any-return]
+    engines = {"flow": server.carry, "timer": server.clock}
+    found = answers_to([line.encode()], next_collision, server.follow, **engines)
+    return json.loads(found)  # type: ignore[no-any-return]
 
 
 def faulty(fault: Fault) -> Callable[[bytes], bytes]:
@@ -243,11 +248,6 @@ def particles_by(request: Line, found: Line, *, key: Callable[[Line], Any]) -> L
     keys = [json.dumps(key(state)) for state in request["states"]]
     there = [known.setdefault(*pair) for pair in zip(keys, found["states"], strict=True)]
     return {**found, "states": there}
-
-
-def by(*names: str) -> Callable[[Line], Any]:
-    """Return a key of some fields."""
-    return lambda state: [state[name] for name in names]
 
 
 def one_bad_spoils_all(_: Line, found: Line) -> Line:

@@ -40,6 +40,7 @@ BYTES = (b"\x00", b"\xff", b"{", b"}", b"[", b'"', b"\\", b"e999", b"NaN", b"\xe
 FACTORS = (-1.0, 0.0, 0.5, 1 - 2.0**-53, 1 + 1e-12, 1.1, 2.0, 1e3, 1e-9)
 # A valid request for so many collisions is work, not an attack: counts are small or refused.
 COUNTS = (-1, 0, 1, 2, 1.5, "3", None, 10**7, 2**70, True)
+SCENES = [dict(read_data(name)) for name in catalogue()]
 STATE = {"t": 0.0, "x": 0.1, "y": 0.3, "vx": 10.0, "vy": 7.0, "wall": None}
 CIRCLE = {"table": "cap", "r": 1.0}
 WARM_UP = [
@@ -49,14 +50,9 @@ WARM_UP = [
 ]
 
 
-def scenes() -> list[dict[str, Any]]:
-    """Return the catalogue as data."""
-    return [dict(read_data(name)) for name in catalogue()]
-
-
 def requests(draw: random.Random) -> dict[str, Any]:
     """Return a valid request of protocol 1, other than stop."""
-    scene = draw.choice(scenes_known)
+    scene = draw.choice(SCENES)
     common = {"seq": draw.randrange(100), "scene": scene, "state": dict(STATE), "t_end": 50.0}
     return draw.choice(
         [
@@ -138,22 +134,3 @@ def lines(seed: int, n: int, kind: Any) -> Iterator[bytes]:
             data = spoil(draw, data)
         line = json.dumps(data).encode()
         yield garble(draw, line) if 0.55 < part < 0.75 else line
-
-
-def as_toml(line: bytes) -> bytes:
-    """Write a line of JSON as TOML; what is garbled stays as it is."""
-    try:
-        data = json.loads(line)
-        lines = [f"{json.dumps(key)} = {_inline(value)}" for key, value in data.items()]
-    except (ValueError, AttributeError, RecursionError):
-        return line
-    return "\n".join(lines).encode("utf-8", "surrogatepass")
-
-
-def _inline(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(key)} = {_inline(part)}" for key, part in value.items()) + "}"
-    return "[" + ", ".join(map(_inline, value)) + "]" if isinstance(value, list) else json.dumps(value)
-
-
-scenes_known = scenes()

@@ -27,7 +27,6 @@ from conformance.cases.certify import (
     marks,
 )
 from conformance.cases.draw import Question, Unfit
-from conformance.cases.flow_families import any_marks
 from conformance.cases.prover import ask, flight_of, inputs_of, moved, proved_step
 from conformance.cases.table import FAMILIES
 from conformance.vectors import NUMBERS, Expectation, certified, four_digits
@@ -266,7 +265,7 @@ def test_stays_by_what_hits_mean(found, spans):
 GALLERY = State(3.0, 0.0, 0.5, 2.0, 0.25)
 
 
-ASKED = Question(SCENE, GALLERY, 6.0, 40, any_marks, group="gallery")
+ASKED = Question(SCENE, GALLERY, 6.0, 40, True, group="gallery")
 
 
 def test_a_hit_on_the_edge_of_being_captured_makes_no_vector():
@@ -276,12 +275,12 @@ def test_a_hit_on_the_edge_of_being_captured_makes_no_vector():
     with pytest.raises(Unfit):
         marks(static, reference.trajectory(static, edge, 1, 9.0).steps)
     with pytest.raises(Unfit):
-        certify(Question(static, edge, 0.75, 40, any_marks, group="edge"), 1)
+        certify(Question(static, edge, 0.75, 40, True, group="edge"), 1)
 
 
 def test_a_flow_keeps_of_its_path_what_is_asked():
     path = reference.trajectory(SCENE, GALLERY, 40, 6.0)
-    steps, found = certify(ASKED._replace(flow=None), 1).expect[0].steps, marks(SCENE, path.steps)
+    steps, found = certify(ASKED._replace(is_flow=False), 1).expect[0].steps, marks(SCENE, path.steps)
     assert {"captured", ""} <= set(found)
     kept = arrival(steps, capture_intervals(found))
     assert certify(ASKED, 1).expect == (kept,)

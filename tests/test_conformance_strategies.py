@@ -177,7 +177,7 @@ def test_a_failing_step_is_printed_as_the_wire_line():
     assert repr(step) == str(failure)
 
 
-@pytest.mark.parametrize("name", deep_but(FAMILIES, "near-corner", "anywhere-stem-left", "nearly-shut"))
+@pytest.mark.parametrize("name", deep_but(FAMILIES, "corner-arrival", "anywhere-stem-left", "nearly-shut"))
 def test_every_family_is_reached(name):
     """By Hypothesis's bits as by a seed's."""
 

@@ -15,13 +15,14 @@ import json
 from collections.abc import Sequence
 from fractions import Fraction
 from math import inf, isfinite
+from typing import Literal
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
 import reference
-from conformance.cases.draw import Mark, Proved, Question, Unfit, file_vector
+from conformance.cases.draw import Proved, Question, Unfit, file_vector
 from conformance.cases.prover import (
     CONDITIONS,
     NUDGES,
@@ -63,6 +64,8 @@ from scene import (
     from_data,
 )
 
+# What a hit means for capture intervals: arc of a mushroom, captured or free; wall of the stem; nothing.
+Mark = Literal["captured", "free", "out", ""]
 WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
 
 
@@ -140,13 +143,13 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     state, t_end = question.state, question.t_end
     try:
         path = reference.trajectory(scene, state, question.collisions, t_end, working=working)
-        captured = marks(scene, path.steps) if question.flow else []
+        captured = marks(scene, path.steps) if question.is_flow else []
     except InvalidState as error:
         raise Unfit(str(error)) from None
     end = path.outcome
-    if question.flow and not (isinstance(end, reference.Horizon) and question.flow(captured)):
-        raise Unfit("not the flow that is looked for")
-    links = Links(scene, state, t_end, is_timed=question.flow is None)
+    if question.is_flow and not isinstance(end, reference.Horizon):
+        raise Unfit("no flow to the horizon")
+    links = Links(scene, state, t_end, is_timed=not question.is_flow)
     steps = _steps(links, path, question)
     if len(steps) < len(path.steps):
         end = None
@@ -157,7 +160,7 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
         raise Unfit("the reference is undecided")
     if any(map(_is_wide, steps)):
         return proved_path(scene, question, 2 * path.digits)
-    if question.flow:
+    if question.is_flow:
         arrived = arrival(steps, capture_intervals(captured))
         largest = max(links.condition, timing_condition(arrived, state))
         if largest > question.longest:
@@ -178,7 +181,7 @@ def _steps(links: Links, path: reference.Trajectory, question: Question) -> list
             break
         links.largest = max(links.largest, links.condition)
         steps.append(certified(collided(found), finite(allowance), found.wall, is_wide=True))
-    if len(steps) < (len(path.steps) if question.flow else 1):
+    if len(steps) < (len(path.steps) if question.is_flow else 1):
         raise Unfit("no collision is met, or the first is too delicate")
     return steps
 

@@ -1,16 +1,26 @@
-"""Families for inputs that few tests have: late times, places near walls, mouths nearly shut or whole."""
+"""Families for inputs that few tests have: late times, long waits, places near walls, laws of many terms."""
 
 from collections.abc import Iterator
 
 import msgspec
 
 from conformance.cases.draw import Draw, Family, Question
-from conformance.cases.families import soon
-from conformance.cases.flow_families import tilted
-from conformance.cases.scenes import MOVING, TABLES, Clock, clock, deep_wave, law, scene, state, time
-from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem
+from conformance.cases.scenes import TABLES, Clock, clock, deep_wave, law, scene, state, time
+from scene import BangBang, Cap, Mushroom, Scene, State, Stem, load
 from scene.geometry import rounded
 from scene.tables import laws
+
+CATALOGUE = (
+    "moving-cap",
+    "moving-cap-reversed",
+    "moving-cap-trivial",
+    "ergodic",
+    "untilted",
+    "fixed-cap-anticlockwise",
+    "fixed-cap-clockwise",
+    "breathing-circle",
+    "fermi-ulam",
+)
 
 
 def knots_off_zero(draw: Draw) -> Question:
@@ -89,67 +99,11 @@ def far_phase(draw: Draw) -> Question:
     return Question(of, *state(draw, of, {"t": t, "speed": draw.power(0, 4)}), also=("rejected",))
 
 
-def far_mouth(draw: Draw) -> Question:
-    """Ask which wall is met where the phase decides: allowances grow with t, so numbers alone say little."""
-    turns = float(draw.power(31, 34) + draw.pick(range(2**20))) + draw.pick(range(64)) / 64
-    shared = Clock(draw.pick(("fourier", "bang-bang", "bang-bang")), draw.pick((0.5, 1.0, 4.0)))
-    of = Mushroom(r=draw.short(1.0, 1.5), h=draw.short(1.0, 1.5), nu=law(draw, 0.1, 0.9, shared))
-    t = draw.pick((1.0, 1.0, -1.0)) * turns * (of.period or shared.rate)
-    y, flight = draw.between(0.1, 0.3), draw.between(0.02, 0.1)
-    widths = rounded(of, t + flight).w, rounded(of, flight).w
-    x = draw.pick((0.5, -0.5)) * (widths[0] + widths[1])
-    return Question(of, State(t, x, y, 0.0, -y / flight), t + 4 * flight, also=("rejected",))
-
-
-def mouth_edge(draw: Draw) -> Question:
-    """Ask about a crossing of y = 0 that misses the mouth's edge by a hundred millionth, or thereabouts."""
-    shared = clock(draw)
-    nu, slope = law(draw, 0.2, 0.8, shared), draw.pick((0.0, draw.short(0.0, 0.05)))
-    of = Mushroom(r=law(draw, 0.75, 1.5, shared), h=law(draw, 1.0, 2.0, shared), nu=nu, slope=slope)
-    t = time(draw, of)
-    flight, off = draw.between(0.25, 1.0) / draw.power(0, 3), draw.pick((1e-6, 1e-7, 1e-8, 1e-8, 1e-8, 1e-9))
-    edge = rounded(of, t + flight).w * (1 + draw.pick((1.0, -1.0)) * off * draw.between(0.5, 2.0))
-    side, y = draw.pick((1.0, -1.0)), draw.between(0.05, 0.4) * draw.pick((1.0, 1.0, -1.0))
-    x = draw.between(-0.1, 0.1)
-    start = State(t, x, y, (side * edge - x) / flight, -y / flight)
-    return Question(of, start, t + 4 * flight)
-
-
-def mouth_nearly_whole(draw: Draw) -> Question:
-    """Ask about a mouth that is as wide as the cap but for a thousand millionth, always or at times."""
-    sliver = 1e-9 * draw.between(0.1, 1.0)
-    shared = clock(draw, MOVING)
-    swing = draw.pick((0.0, 2.0**-30, 0.25))
-    nu: float | Fourier | BangBang = 1.0 - sliver
-    if swing and shared.kind == "fourier":
-        nu = Fourier(mean=1.0 - sliver - swing, omega=shared.rate, cos=(swing,))
-    elif swing:
-        low = 1.0 - sliver - 2 * swing
-        nu = BangBang(knots=((0.0, 1.0 - sliver), (shared.rate / 2, low), (shared.rate, 1.0 - sliver)))
-    of = Mushroom(r=law(draw, 0.75, 1.5, shared), h=law(draw, 1.0, 2.0, shared), nu=nu)
-    t = time(draw, of)
-    flight, speed_up = draw.between(0.25, 1.0) / draw.power(0, 3), draw.pick((1.0, -1.0))
-    there = rounded(of, t + flight)
-    part = draw.pick((draw.part(), draw.part(), -draw.part(), -1e6 * draw.part()))
-    aim = there.w + part * (there.r - there.w)
-    x, y = draw.between(-0.1, 0.1), draw.between(0.05, 0.3)
-    start = State(t, x, y, (speed_up * aim - x) / flight, -y / flight)
-    return Question(of, start, t + 4 * flight)
-
-
 def many_harmonics(draw: Draw) -> Question:
     """Ask about laws of four to sixteen."""
     of = scene(draw, draw.pick(TABLES), Clock("harmonics", draw.pick((1.0, 3.0, 8.0))))
     at = {"speed": draw.power(-3, 4), "patience": draw.pick((4.0, 16.0))}
     return Question(of, *state(draw, of, at))
-
-
-def tilting_side(draw: Draw) -> Question:
-    """Ask a slow particle beside such a side."""
-    of = tilted(draw, clock(draw, MOVING))
-    at = {"site": draw.pick(("stem", "left", "right")), "speed": draw.power(-4, 1), "patience": 4.0}
-    at["lift"] = draw.power(-12, -1)
-    return soon(of, state(draw, of, at))
 
 
 def mixed_laws(draw: Draw) -> Question:
@@ -172,6 +126,16 @@ def deep_waves(draw: Draw) -> Question:
     return Question(of, *state(draw, of, {"speed": draw.power(-4, 2), "patience": draw.pick((1.0, 4.0))}))
 
 
+def late_start(draw: Draw) -> Question:
+    """Begin as late as binary64 allows, or a million periods late."""
+    if draw.pick((False, True)):
+        of, most = scene(draw, draw.pick(TABLES), Clock("constant")), 44
+    else:
+        of, most = load(draw.pick(CATALOGUE)), 20
+    t = draw.power(8, most) * draw.between(1.0, 2.0)
+    return Question(of, *state(draw, of, {"t": t}))
+
+
 FAMILIES = (
     Family(
         "knots-off-zero",
@@ -190,36 +154,10 @@ FAMILIES = (
     ),
     Family("far-phase", "a phase more than 2^31 periods late", far_phase, "hard case 39", 30),
     Family(
-        "mouth-edge",
-        "the mouth's edge is missed by little: no tolerance opens or closes it",
-        mouth_edge,
-        "hard case 23",
-        40,
-    ),
-    Family(
-        "mouth-nearly-whole",
-        "nu within a thousand millionth of 1: the base is a sliver",
-        mouth_nearly_whole,
-        "hard case 32",
-        30,
-    ),
-    Family(
         "many-harmonics", "four to sixteen harmonics: all of them count", many_harmonics, "hard case 15", 30
     ),
-    Family(
-        "tilting-side",
-        "a side that moves and tilts: its rate and its curvature grow with depth",
-        tilting_side,
-        n_vectors=40,
-    ),
+    Family("late-start", "a late start: dt keeps its precision", late_start, "hard cases 38, 39", 50),
     Family("mixed-laws", "laws of every kind in one scene, of one period", mixed_laws, n_vectors=40),
-    Family(
-        "far-mouth",
-        "the mouth more than 2^31 periods late: open or closed, as it is not at time 0",
-        far_mouth,
-        "hard case 39",
-        24,
-    ),
     Family(
         "deep-waves",
         "amplitudes that add up to more than the mean of a law that is positive all the same",

@@ -16,7 +16,6 @@ from math import sqrt
 import msgspec
 
 from conformance.cases.draw import Draw, Family, Question, Unfit
-from conformance.cases.flow_families import any_marks
 from conformance.cases.scenes import (
     KINDS,
     LONGEST,
@@ -84,7 +83,7 @@ def rebounding(table: str, wall: Wall, draw: Draw) -> Question:
     away = 2 * (vx * nx + vy * ny + table_then.receding(wall, y))
     vx, vy, before = vx - away * nx, vy - away * ny, (of.period or 1.0) * draw.power(-16, -6)
     start = State(t - before, x - vx * before, y - vy * before, vx, vy)
-    return Question(of, start, asked.t_end, *draw.pick(((40, any_marks), (None, None))))
+    return Question(of, start, asked.t_end, *draw.pick(((40, True), (None, False))))
 
 
 def under_a_growing_cap(draw: Draw) -> Mushroom:

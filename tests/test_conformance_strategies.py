@@ -161,7 +161,9 @@ def test_every_kind_of_scene_and_start_is_reached():
 
 def printed(failure, hold, n):
     """Return the wire's line that is printed when a property fails, and the failure."""
-    trial = settings(max_examples=n, database=None, derandomize=True)(given(scenes_and_states())(hold))
+    trial = settings(max_examples=n, database=None, derandomize=True, deadline=None)(
+        given(scenes_and_states())(hold)
+    )
     with pytest.raises(failure) as caught:
         trial()
     return next(text for text in caught.value.__notes__ if '"cmd"' in text), caught.value

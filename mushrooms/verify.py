@@ -14,7 +14,7 @@ from conformance import verify as verifier
 from conformance.audit.runs import scene_named
 from conformance.cases.draw import wire_form
 from conformance.files import write_file
-from conformance.suite.sheet_files import read_number, read_rows
+from conformance.suite.sheet import read_number, read_rows
 from mushrooms import output
 from scene import State, from_data
 from scene.refusal import BadInput, shown

@@ -194,7 +194,7 @@ HEADER = "seq,outcome,t,x,y,vx,vy\n"
 ROW = "1,collision,1,0,0,1,1\n"
 BAD_ANSWERS = {
     "empty": ("a.jsonl", "", "holds no answer"),
-    "no json": ("a.jsonl", "yes\n", "a.jsonl':1: no JSON, and no seq: yes"),
+    "no json": ("a.jsonl", "yes\n", "a.jsonl':1: has no seq, must have that of its question: yes"),
     "no seq": ("a.jsonl", "{}\n", "has no seq"),
     "a list": ("a.jsonl", "[1]\n", "has no seq"),
     "twice": ("a.jsonl", LINE % 7 + LINE % 7, "a.jsonl':2: seq = 7 is answered twice, first at 1"),

@@ -18,10 +18,10 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
-import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -37,7 +37,7 @@ from conformance.suite.result import LAWS, TABLES, Run
 from conformance.suite.run import RunQuestions, ask_nonsense, converse
 from conformance.suite.session import MAX_SEQ, Session, needs, probe_values
 from conformance.vectors import LEVELS, Vector
-from scene.protocol.messages import PROFILES, PROTOCOL, Introduction
+from scene.protocol.messages import PROFILES, PROTOCOL, Echoed, Introduction
 from scene.protocol.wire import serve
 from scene.refusal import BadInput, shown
 
@@ -69,7 +69,6 @@ STATE = ("t", "x", "y", "vx", "vy")
 COLUMNS = ("seq", "cmd", "collisions", *STATE, "wall", "t_end")  # of questions
 NEEDED = ("seq", "outcome", *STATE)  # of answers
 OPTIONAL = ("wall", "dt", "t_in", "t_out", "reason")
-MAX_SIZE = 2**30  # bytes of a file of answers
 
 
 class SheetQuestion(NamedTuple):
@@ -155,11 +154,9 @@ class Sheet(RunQuestions):
 def signed(echoes: Sequence[bytes]) -> tuple[str, int] | None:
     """Return the level and the seed that answers tell; None where none does."""
     for line in echoes:
-        values = msgspec.json.decode(line).get("values")
-        if isinstance(values, list) and len(values) == 3:
-            high, low, place = (int(number) for number in values)
-            if 0 <= place < len(LEVELS):
-                return LEVELS[place], high * WORD + low
+        with suppress(*UNREADABLE, ValueError, OverflowError, IndexError):
+            high, low, place = map(int, msgspec.json.decode(line, type=Echoed).values)
+            return LEVELS[place], high * WORD + low
     return None
 
 
@@ -324,10 +321,8 @@ def read_key(questions: Path) -> Sheet:
     path = key_file(questions)
     try:
         key = msgspec.json.decode(path.read_bytes(), type=Key)
-    except OSError as error:
-        raise BadInput(f"--questions: the key {str(path)!r} cannot be read: {error.strerror}") from None
-    except UNREADABLE as error:
-        raise BadInput(f"--questions: {str(path)!r} is no key: {error}") from None
+    except (OSError, *UNREADABLE) as error:
+        raise BadInput(f"--questions: the key {str(path)!r} cannot be read: {error}") from None
     if key.corpus != vectors.manifest().digest:
         raise BadInput(f"--questions: {str(path)!r} is of another corpus: write the questions anew")
     return Sheet(key.level, key.seed, key.fresh)
@@ -339,15 +334,15 @@ def read_answers(path: Path) -> Answers:
     Raises:
         BadInput: in one line, with the place.
     """
+    files = sorted(path.glob("*.csv")) if path.is_dir() else [path]
+    is_table = path.is_dir() or path.suffix == ".csv"
     try:
-        if path.is_dir():
-            files = sorted(path.glob("*.csv"))
-            return _of_tables(files, path)
-        if path.stat().st_size > MAX_SIZE:
-            raise BadInput(f"answers {str(path)!r}: larger than {MAX_SIZE} bytes")
-        return _of_tables([path], path) if path.suffix == ".csv" else _of_lines(path)
+        found = _of_tables(files, path) if is_table else _of_lines(path)
     except OSError as error:
         raise BadInput(f"answers {str(path)!r} cannot be read: {error.strerror}") from None
+    if not found.lines:
+        raise BadInput(f"answers {str(path)!r}: holds no answer")
+    return found
 
 
 def _key(sheet: Sheet) -> bytes:
@@ -358,20 +353,22 @@ def _scene_lines(scene: Mapping[str, Any]) -> Iterator[str]:
     """Yield a scene as lines of words: # law kind field place number."""
     yield f"# table {scene['table']}\n"
     for name, law in scene.items():
-        if name in ("table", "name", "notes"):
-            continue
-        if not isinstance(law, Mapping):
-            yield f"# {name} constant value 1 {float(law)!r}\n"
-            continue
-        for field, value in law.items():
-            if field == "kind":
-                continue
-            columns = {"time": 0, "value": 1} if field == "knots" else {field: None}
-            for label, column in columns.items():
-                numbers = value if isinstance(value, list | tuple) else [value]
-                for place, one in enumerate(numbers, 1):
-                    number = one if column is None else one[column]
-                    yield f"# {name} {law['kind']} {label} {place} {float(number)!r}\n"
+        if name not in ("table", "name", "notes"):
+            kind = law["kind"] if isinstance(law, Mapping) else "constant"
+            for field, numbers in _fields(law).items():
+                for place, number in enumerate(numbers, 1):
+                    yield f"# {name} {kind} {field} {place} {float(number)!r}\n"
+
+
+def _fields(law: Any) -> dict[str, Sequence[float]]:
+    """Return the numbers of a law by their names; a bang-bang law has times and values."""
+    if not isinstance(law, Mapping):
+        return {"value": [law]}
+    if "knots" in law:
+        times, values = zip(*law["knots"], strict=True)
+        return {"time": times, "value": values}
+    fields = {name: part for name, part in law.items() if name != "kind"}
+    return {name: part if isinstance(part, list | tuple) else [part] for name, part in fields.items()}
 
 
 def _rows(questions: Sequence[SheetQuestion]) -> Iterator[str]:
@@ -389,25 +386,18 @@ def _of_lines(path: Path) -> Answers:
     places: dict[int, str] = {}
     introduction, echoes = None, []
     for number, line in enumerate(path.read_bytes().split(b"\n"), 1):
-        if not line.strip():
-            continue
         place = f"answers {str(path)!r}:{number}"
-        seq = SEQ.search(line)
-        if seq is None:
-            try:
-                data = json.loads(line)
-            except (*UNREADABLE, ValueError):
-                raise BadInput(
-                    f"{place}: no JSON, and no seq: {clean(line[:60].decode('utf-8', 'replace'))}"
-                ) from None
-            if not isinstance(data, dict) or not data.keys() & {"protocol", "values"}:
-                raise BadInput(f"{place}: has no seq, must have that of its question")
-            introduction = line if "protocol" in data else introduction
-            echoes += [line] if "values" in data else []
-            continue
-        _once(places, int(seq[1]), place)
-        found[int(seq[1])] = line
-    return _some(Answers(str(path), found, introduction, tuple(echoes), places))
+        if seq := SEQ.search(line):
+            _once(places, int(seq[1]), place)
+            found[int(seq[1])] = line
+        elif b'"protocol"' in line:
+            introduction = line
+        elif b'"values"' in line:
+            echoes.append(line)
+        elif line.strip():
+            said = clean(line[:60].decode("utf-8", "replace"))
+            raise BadInput(f"{place}: has no seq, must have that of its question: {said}")
+    return Answers(str(path), found, introduction, tuple(echoes), places)
 
 
 def _once(places: dict[int, str], seq: int, place: str) -> None:
@@ -416,25 +406,22 @@ def _once(places: dict[int, str], seq: int, place: str) -> None:
     places[seq] = place
 
 
-def _some(answers: Answers) -> Answers:
-    if not answers.lines:
-        raise BadInput(f"answers {answers.source!r}: holds no answer")
-    return answers
-
-
 def _of_tables(files: Sequence[Path], source: Path) -> Answers:
     rows: dict[int, list[dict[str, Any]]] = {}
     places: dict[int, str] = {}
     for path in files:
         last, label = None, f"answers {str(path)!r}"
         for place, cells in read_rows(path, label, NEEDED, (*NEEDED, *OPTIONAL)):
-            seq = _whole(place, cells["seq"])
+            number = read_number(place, "seq", cells["seq"])
+            if not number.is_integer():
+                raise BadInput(f"{place}: seq = {shown(cells['seq'])}, must be a whole number")
+            seq = int(number)
             if seq != last:
                 _once(places, seq, place)
             rows.setdefault(seq, []).append(_outcome(place, cells))
             last = seq
     lines = {seq: msgspec.json.encode(parts) for seq, parts in rows.items()}
-    return _some(Answers(str(source), lines, None, (), places))
+    return Answers(str(source), lines, None, (), places)
 
 
 def read_rows(
@@ -500,10 +487,3 @@ def read_number(place: str, name: str, text: str) -> float:
     if not math.isfinite(number):
         raise BadInput(f"{place}: {name} = {shown(text)}, must be a finite number, decimal or as 0x1.8p+3")
     return number
-
-
-def _whole(place: str, text: str) -> int:
-    number = read_number(place, "seq", text)
-    if number != int(number):
-        raise BadInput(f"{place}: seq = {shown(text)}, must be a whole number")
-    return int(number)

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from conformance.audit.causes import likely_causes
 from conformance.audit.claim import Check
 from conformance.audit.ensemble import (
     GivenEnsemble,
     checks,
     cycle_start,
     expected,
+    likely_causes,
     nu_at,
     reversal,
 )

@@ -101,13 +101,14 @@ def audit_ensemble(
     with output.writable_folder(out) as folder:
         result = examine(path, found, reversed_path, options)
         data = to_data(result, path, scene_name)
-        texts = {
-            "report.json": json.dumps(data, indent=1, ensure_ascii=False) + "\n",
-            "report.txt": to_text(data),
-        }
         from mushrooms.reports import ensemble_page  # it draws, and drawing takes a second to import
 
-        write_files(folder, {**texts, "report.html": ensemble_page.to_html(data, result.given)})
+        texts = {
+            "report.json": json.dumps(data, indent=1, ensure_ascii=False) + "\n",
+            "report.txt": ensemble_page.to_text(data),
+            "report.html": ensemble_page.to_html(data, result.given),
+        }
+        write_files(folder, texts)
     print(texts["report.json" if as_json else "report.txt"], end="")
     if not as_json:
         print(f"Report: {folder / 'report.html'}")
@@ -190,34 +191,6 @@ def to_data(result: EnsembleAudit, path: Path, scene_name: str) -> dict[str, Any
         "causes": result.causes,
         "checks": [{**check._asdict(), "pull": pull(check)} for check in result.checks],
     }
-
-
-def to_text(data: dict[str, Any]) -> str:
-    """Return the report as lines."""
-    words = {True: "holds", False: "FAILS", None: "open"}
-    lines = [f"{data['ensemble']} against {data['scene']}: {data['verdict']}"]
-    lines.append(f"{data['particles']:,} particles, {data['lost']:,} without an energy")
-    lines += [f"note: {note}" for note in data["notes"]]
-    for check in data["checks"]:
-        lines.append(f"{words[check['holds']]:5}  {check['what']}: {said(check)}")
-    lines += [f"likely cause: {cause}" for cause in data["causes"]]
-    if data["verdict"] == "refuted" and not data["causes"]:
-        lines.append("likely cause: none of those that are known")
-    return "\n".join(lines) + "\n"
-
-
-def said(check: dict[str, Any]) -> str:
-    """Return what was found, what is expected, and what the comparison is worth."""
-    if check["value"] is None:
-        return f"{check['note']}, must be {check['expected']}"
-    parts = [f"{check['value']:.6g}"]
-    parts[0] += f" ± {check['error']:.2g}" if check["error"] else ""
-    expected_value = check["expected"] if check["error"] is None else f"{float(check['expected']):.6g}"
-    parts.append(f"theory {expected_value}" + (f", left out {check['band']:.2g}" if check["band"] else ""))
-    parts += [f"pull {check['pull']:+.1f}"] if check["pull"] is not None else []
-    parts += [f"would see {check['sees']:.2g}"] if check["sees"] is not None else []
-    parts += [f"power {check['power']:.2f} against {check['against']}"] if check["power"] is not None else []
-    return "; ".join(parts)
 
 
 def read_table(path: Path, scene: Mushroom, energy: float | None, unit: float) -> tuple[GivenEnsemble, int]:

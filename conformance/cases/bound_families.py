@@ -204,7 +204,6 @@ FAMILIES = (
             f"bend-{name}-{kind}",
             f"a bound of f'' forgets a term: {name}, of laws that are {kind}",
             partial(bend, term, kind),
-            n_vectors=8 if term.is_fast else 0,
             weight=3 if term.is_fast else 1,
         )
         for name, term in TERMS.items()

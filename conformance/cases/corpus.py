@@ -1,9 +1,9 @@
 """The corpus as it was published, and what is added to it; `python -m conformance.cases`.
 
-A published question stands in its line, and nowhere else; a new one is written by hand, or drawn by a family
-from a stream seeded by its id. All are answered by the reference and proved by the verifier, so the same
-corpus comes out on every machine, bit for bit. The command makes the corpus, adds to it, checks that it is
-what would be made, or packs it: some ten minutes on one core; `--jobs N` shares them out.
+A published question stands in its line, and nowhere else; a new one is written by hand, or drawn by a
+family. All are answered by the reference and proved by the verifier. The command makes the corpus anew, adds
+to it, checks that it is what would be made, or packs it: some ten minutes on one core; `--jobs N` shares
+them out.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from typing import Any
 import msgspec
 
 from conformance.cases.certify import certify
-from conformance.cases.draw import Draw, Family, Question, Unfit
+from conformance.cases.draw import Question
 from conformance.cases.table import FAMILIES
 from conformance.files import write_file
 from conformance.vectors import (
@@ -41,8 +41,6 @@ from scene import BadInput
 VERSION = "1.3"
 RETIRED: tuple[str, ...] = ()
 FOLDER = Path(__file__).parent.parent / "corpus"
-BY_HAND = ("hard-case-", "at-the-horizon")  # how their groups begin
-ATTEMPTS = 64
 ROUNDING = 1e-30  # of an allowance that vanishes
 
 
@@ -70,42 +68,14 @@ def published() -> dict[str, Vector]:
 
 
 def groups() -> dict[str, int]:
-    """Return how many vectors every group has, numbered from 1: published, or still to be drawn."""
-    found = Counter(name.partition("/")[0] for name in (*published(), *RETIRED))
-    for family in FAMILIES.values():
-        if family.n_vectors > found[family.name]:
-            found[family.name] = family.n_vectors
-    return found
+    """Return how many vectors every group has, numbered from 1."""
+    return Counter(name.partition("/")[0] for name in (*published(), *RETIRED))
 
 
-def draw_vector(family: Family, number: int) -> Vector:
-    """Return a family's vector of that number: its first draw that has a certified answer."""
-    for attempt in range(ATTEMPTS):
-        question = family.attempt(Draw(f"{family.name}/{number}/{attempt}"))
-        if question is None:
-            continue
-        try:
-            vector = certify(question, number)
-        except Unfit:
-            continue
-        if vector.expect[0].outcome in ("collision", "horizon"):
-            return vector
-    raise BadInput(f"{family.name}/{number}: none of {ATTEMPTS} draws has a certified answer")
-
-
-def make(group: str, number: int) -> Vector:
-    """Make one vector of the corpus anew; a published line stays if what is made agrees with it.
-
-    Raises:
-        BadInput: when there is no such vector.
-    """
-    name = f"{group}/{number}"
-    if not 1 <= number <= groups().get(group, 0) or name in RETIRED:
-        raise BadInput(f"vector = {name}, must be one of the corpus")
-    line = published().get(name)
-    if line is None:
-        return draw_vector(FAMILIES[group], number)
-    made = certify(question_of(line), number)
+def make(name: str) -> Vector:
+    """Make a published vector anew; its line stays if what is made agrees with it."""
+    line = published()[name]
+    made = certify(question_of(line), int(name.partition("/")[2]))
     return line if agrees(made, line) else made
 
 
@@ -135,25 +105,24 @@ def _steps(vector: Vector) -> list[Certified]:
 
 
 def certify_added(path: Path) -> list[Vector]:
-    """Certify questions that were written by hand, which go to the ends of their groups.
+    """Certify new questions, which go to the ends of their groups.
 
     Args:
-        path: JSON lines: group, rule, source, scene, state, t_end; for a path kind and collisions; and where
-            further outcomes are right, these as `also`.
-
-    Raises:
-        BadInput: a group is one of drawn vectors.
+        path: JSON lines. A family's question is given by `family`, `seed` and `index`, as `mushrooms attack`
+            names it. One that is written by hand has group, rule, source, scene, state and t_end; for a path
+            kind and collisions; and where further outcomes are right, these as `also`.
     """
     found: list[Vector] = []
     for line in path.read_bytes().splitlines():
         data = {"level": "stress", "kind": "step", **msgspec.json.decode(line)}
-        group = data["group"]
-        if not group.startswith(BY_HAND):
-            raise BadInput(f"group = {group!r}, must begin with {' or '.join(BY_HAND)}")
-        number = groups().get(group, 0) + sum(vector.group == group for vector in found) + 1
-        expect = [{"outcome": outcome} for outcome in ("rejected", *data.pop("also", ()))]
-        asked = question_of(msgspec.convert({**data, "id": f"{group}/{number}", "expect": expect}, Vector))
-        found.append(certify(asked._replace(level=None), number))
+        if "family" in data:
+            asked = FAMILIES[data["family"]].question(f"{data['seed']}/{data['index']}")
+        else:
+            expect = [{"outcome": outcome} for outcome in ("rejected", *data.pop("also", ()))]
+            written = msgspec.convert({**data, "id": f"{data['group']}/0", "expect": expect}, Vector)
+            asked = question_of(written)._replace(level=None)
+        number = groups().get(asked.group, 0) + sum(vector.group == asked.group for vector in found) + 1
+        found.append(certify(asked, number))
     return found
 
 
@@ -180,20 +149,14 @@ def write(folder: Path, vectors: Iterable[Vector]) -> Manifest:
     return written
 
 
-def _made(most: int | None, n_jobs: int) -> list[Vector]:
-    """Make all vectors, or the first few of each group, on so many processes."""
-    wanted = [
-        (group, number)
-        for group, n in groups().items()
-        for number in range(1, min(n, most or n) + 1)
-        if f"{group}/{number}" not in RETIRED
-    ]
-    found = []
+def _made(n_jobs: int) -> list[Vector]:
+    """Make all vectors, on so many processes."""
+    found: list[Vector] = []
     with ProcessPoolExecutor(n_jobs) as pool:
-        for vector in pool.map(make, *zip(*wanted, strict=True), chunksize=4):
+        for vector in pool.map(make, published(), chunksize=4):
             found.append(vector)
             if len(found) % 100 == 0:
-                print(f"{len(found)} of {len(wanted)} vectors", file=sys.stderr, flush=True)
+                print(f"{len(found)} of {len(published())} vectors", file=sys.stderr, flush=True)
     return found
 
 
@@ -223,18 +186,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--archive", type=Path, metavar="FILE", help="write the corpus and verify.py as .zip")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")
-    parser.add_argument("--most", type=int, metavar="N", help="at most so many vectors of each group")
     options = parser.parse_args(arguments)
-    for name, number in (("most", options.most), ("jobs", options.jobs)):
-        if number is not None and number < 1:
-            parser.error(f"--{name} = {number}, must be >= 1")
+    if options.jobs < 1:
+        parser.error(f"--jobs = {options.jobs}, must be >= 1")
     try:
         if options.archive:
             return archive(options.archive)
         if options.check:
-            return _check(options.out, _made(options.most, options.jobs))
+            return _check(options.out, _made(options.jobs))
         known = [*load("stress", FOLDER), *certify_added(options.add)] if options.add else None
-        vectors = known or _made(options.most, options.jobs)
+        vectors = known or _made(options.jobs)
         written = write(options.out, vectors)
     except (BadInput, OSError) as error:
         print(f"conformance.cases: {error}", file=sys.stderr)

@@ -157,7 +157,6 @@ class Family(NamedTuple):
         aim: what it tests, or the mistake that it hunts.
         ask: from a stream of numbers to a question; it may raise Unfit or BadInput for another draw.
         source: place in the paper, or hard case.
-        n_vectors: how many the corpus is to have.
         weight: how many are in each round of a run's questions.
         meets: the wall that such a question meets first; None for any.
         is_delicate: built so that an honest stepper may often leave it undecided.
@@ -167,7 +166,6 @@ class Family(NamedTuple):
     aim: str
     ask: Callable[[Draw], Question]
     source: str = "sec. 2"
-    n_vectors: int = 0
     weight: int = 0
     meets: Wall | None = None
     is_delicate: bool = False

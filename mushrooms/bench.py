@@ -17,7 +17,7 @@ import fast
 from conformance.bench import baselines, growth, record, solvers, workloads
 from conformance.bench.record import Record, Size, quartiles
 from conformance.bench.solvers import Family, Solver, by_command
-from conformance.cases.prover import proved_step
+from conformance.cases.certify import proved_step
 from conformance.files import Writer, write_files
 from conformance.harness.examples import find_examples
 from conformance.suite.process import CheckFailure

@@ -21,13 +21,17 @@ from conformance.cases.certify import (
     FalseClaim,
     Links,
     arrival,
+    ask,
     capture_intervals,
     certify,
     claimed_path,
+    flight_of,
+    inputs_of,
     marks,
+    moved,
+    proved_step,
 )
 from conformance.cases.draw import Question, Unfit
-from conformance.cases.prover import ask, flight_of, inputs_of, moved, proved_step
 from conformance.cases.table import FAMILIES
 from conformance.vectors import NUMBERS, Expectation, certified, four_digits
 from conformance.verify import Verdict

@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import msgspec
 
-from conformance.cases.certify import claimed_path, judge
+from conformance.cases.certify import claimed_path, judge, proved_step
 from conformance.cases.draw import Family, Proved, Question, file_vector
-from conformance.cases.prover import proved_step
 from conformance.grading.agreement import compare
 from conformance.vectors import Expectation
 from scene import Outcome, Rejected, Scene, State, Undecided, from_data

@@ -18,9 +18,8 @@ from math import inf
 from typing import Any
 
 from conformance import plain
-from conformance.cases.certify import certify
+from conformance.cases.certify import CONDITIONS, NUDGES, SIGNS, certify, nudged
 from conformance.cases.draw import ATTEMPTS, Draw, Family, Question, Unfit, wire_form
-from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, nudged
 from conformance.cases.run_families import is_leaning
 from conformance.cases.scenes import LATE
 from conformance.cases.table import FAMILIES

@@ -34,7 +34,7 @@ from conformance.cases.scenes import many_legs
 from conformance.cases.table import FAMILIES
 from conformance.grading.agreement import middle
 from conformance.grading.grade import SHARP, grade
-from conformance.plain.flow import PlainPath
+from conformance.plain.step import PlainPath
 from conformance.suite.checks import checks_of
 from conformance.suite.symmetry import Transform, draw_transform
 from conformance.verify import Verdict, verify_line

@@ -27,7 +27,7 @@ import numpy.typing as npt
 
 import reference
 from conformance.cases.draw import Proved, Question, Unfit, file_vector
-from conformance.plain.flow import CaptureInterval
+from conformance.plain.step import CaptureInterval
 from conformance.vectors import (
     DIGITS,
     NUMBERS,

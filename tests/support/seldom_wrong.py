@@ -19,9 +19,7 @@ from conformance.mutants.laws import single
 from conformance.mutants.mutant import make_mutant
 from conformance.mutants.roots import TieBlind
 from conformance.mutants.walls import UPRIGHT
-from conformance.plain.flow import MAX_COLLISIONS, PlainPath
-from conformance.plain.motion import BangBangMotion, ConstantMotion
-from conformance.plain.step import Flight
+from conformance.plain.step import MAX_COLLISIONS, BangBangMotion, ConstantMotion, Flight, PlainPath
 from scene import BangBang, Fourier, Mushroom, Rejected, from_data
 from scene.tables import laws
 

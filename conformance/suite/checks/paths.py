@@ -23,7 +23,7 @@ from msgspec.structs import replace
 from conformance import plain
 from conformance.cases import scenes
 from conformance.cases.draw import Draw, leaves, readable, wire_form
-from conformance.plain.flow import CaptureInterval
+from conformance.plain.step import CaptureInterval
 from conformance.properties import BOUND, SLACK
 from conformance.suite.answers import read_outcome
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves

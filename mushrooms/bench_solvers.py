@@ -8,8 +8,16 @@ import time
 import fast
 import reference
 from conformance import plain
-from conformance.bench.growth import FAR, PathFollower, PathPoint, Sensitivity
-from conformance.bench.solvers import Solver, SolverAnswer, SolverRun, by_call
+from conformance.bench.solvers import (
+    FAR,
+    PathFollower,
+    PathPoint,
+    Sensitivity,
+    Solver,
+    SolverAnswer,
+    SolverRun,
+    by_call,
+)
 from conformance.bench.workloads import FLIGHTS, Workload
 from conformance.cases.certify import Links, collided
 from conformance.grading.agreement import Answer, Enclosed, exact

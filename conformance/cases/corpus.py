@@ -160,12 +160,6 @@ def _made(n_jobs: int) -> list[Vector]:
     return found
 
 
-def _summary(vectors: Iterable[Vector]) -> str:
-    kinds = Counter((vector.kind, vector.level) for vector in vectors)
-    names = {"step": "steps", "trajectory": "trajectories", "flow": "flows"}
-    return ", ".join(f"{n} {level} {names[kind]}" for (kind, level), n in sorted(kinds.items()))
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command.
 
@@ -200,7 +194,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (BadInput, OSError) as error:
         print(f"conformance.cases: {error}", file=sys.stderr)
         return 2
-    print(f"corpus {written.corpus}, {written.digest[:12]}: {_summary(vectors)}")
+    print(f"corpus {written.corpus}, {written.digest[:12]}: {len(vectors)} vectors")
     return 0
 
 

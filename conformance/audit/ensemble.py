@@ -42,7 +42,6 @@ from scene import Mushroom
 from scene.geometry import half_width, table_at
 from scene.laws import bounds, values
 from scene.refusal import BadInput
-from scene.tables import laws
 from scene.transforms import backwards
 from theory.finite_energy.one_cycle import TheoryError
 
@@ -152,10 +151,8 @@ def cycle_start(scene: Mushroom) -> float:
 
 def walls_speed(scene: Mushroom) -> float:
     """Return the largest rate of a size over a cycle [length / time]."""
-    times = np.linspace(0.0, scene.period, N_TIMES + 1)
-    sizes = [values(law, times) for name, law in laws(scene).items() if name not in ("nu", "slope")]
-    sizes.append(half_width(fp, scene, times))
-    return float(max(np.max(np.abs(np.diff(size))) for size in sizes) * N_TIMES / scene.period)
+    now = table_at(fp, scene, np.linspace(0.0, scene.period, N_TIMES + 1))
+    return max(float(np.max(np.abs(rate))) for rate in (now.r_rate, now.w_rate, now.h_rate))
 
 
 def nu_at(scene: Mushroom, times: FloatArray) -> FloatArray:
@@ -327,24 +324,24 @@ class Rival(NamedTuple):
 
 def likely_causes(given: GivenEnsemble, theirs: Theory, found: list[Check]) -> list[str]:
     """Say what is likely wrong, a line each; nothing where every check holds or nothing known fits."""
-    if all(check.holds is not False for check in found):
+    wrong = {check.what for check in found if check.holds is False}
+    if not wrong:
         return []
-    told = [*_told_by_records(given, theirs), *_told_by_stays(given, theirs, found)]
+    records = list(_told_by_records(given, theirs))
+    told = [*records, *_told_by_stays(given, theirs, wrong)]
     s = _some(given.s, N_LOOKED_AT)
-    distance = gap(s, theirs.cdf)
-    if distance <= critical_gap(len(s)) + shape_band(theirs):
+    distance, reach = gap(s, theirs.cdf), critical_gap(len(s)) + shape_band(theirs)
+    if distance <= reach:
         return told
     fitting = []
-    wrong = {check.what for check in found if check.holds is False}
     for rival in _rivals(given, theirs, wrong.isdisjoint((TIMES, CAPTURED, FREE))):
         with np.errstate(all="ignore"):
             undone = rival.undo(s)
-        if np.all(np.isfinite(undone)):
-            left = gap(undone, rival.cdf)
-            reach = max(critical_gap(len(s)) + shape_band(theirs), CLOSE)
-            fitting += [(left, rival.said)] if left <= min(reach, NEARER * distance) else []
+        left = gap(undone, rival.cdf) if np.isfinite(undone).all() else math.inf
+        if left <= min(max(reach, CLOSE), NEARER * distance):
+            fitting.append((left, rival.said))
     if not fitting and wrong.issuperset((IDENTITY, PEAK, FREE)):
-        return [*_told_by_records(given, theirs), BOUNCE]
+        return [*records, BOUNCE]
     return [*told, *(said for _, said in sorted(fitting)[:2])]
 
 
@@ -367,8 +364,7 @@ def _told_by_records(given: GivenEnsemble, theirs: Theory) -> Iterator[str]:
         yield "nobody is captured: captured particles were dropped, or captures were not looked for"
 
 
-def _told_by_stays(given: GivenEnsemble, theirs: Theory, found: list[Check]) -> Iterator[str]:
-    wrong = {check.what for check in found if check.holds is False}
+def _told_by_stays(given: GivenEnsemble, theirs: Theory, wrong: set[str]) -> Iterator[str]:
     if not wrong.isdisjoint((STARTS, OUTWARD)):
         yield "starts are not uniform in area: on a wall only, or in one part of the table"
     if given.t_in is None or given.t_out is None or not np.isfinite(given.t_in).any():

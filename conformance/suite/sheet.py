@@ -72,7 +72,7 @@ OPTIONAL = ("wall", "dt", "t_in", "t_out", "reason")
 
 
 class SheetQuestion(NamedTuple):
-    """A question of a sheet: the case it is of, its sequence number, and the request without it."""
+    """A question of a sheet: the case it is of, its sequence number, and the request, whatever its own is."""
 
     case: str
     seq: int
@@ -112,13 +112,14 @@ class Sheet(RunQuestions):
 
     Attributes:
         questions: by what they ask, in the order of a run.
+        by_number: the same by their sequence numbers.
     """
 
     def __init__(self, level: str, seed: int, proved: Sequence[Vector] | None = None) -> None:
         super().__init__(level, seed, proved=proved)
         self.fresh, self.checks = list(self.fresh), checks_in_files(level)
         self.questions: dict[bytes, SheetQuestion] = {}
-        self._numbers = set[int]()
+        self.by_number: dict[int, SheetQuestion] = {}
         for vector, image in self.vectors():
             self.add(vector.id, vectors.request(image.apply(vector), 0))
         recorder = _Recorder(self)
@@ -134,10 +135,9 @@ class Sheet(RunQuestions):
             return
         digest = hashlib.sha256(f"{self.seed} {self.level} {case} ".encode() + key).digest()
         seq = int.from_bytes(digest[:4], "big") % MAX_SEQ + 1
-        while seq in self._numbers:
+        while seq in self.by_number:
             seq = seq % MAX_SEQ + 1
-        self._numbers.add(seq)
-        self.questions[key] = SheetQuestion(case, seq, {k: v for k, v in request.items() if k != "seq"})
+        self.questions[key] = self.by_number[seq] = SheetQuestion(case, seq, dict(request))
 
     def lines(self) -> list[bytes]:
         """Return the questions as a program of protocol 1 reads them, `start` and `stop` included."""
@@ -177,9 +177,8 @@ def grade_answers(sheet: Sheet, answers: Answers) -> Run:
     Raises:
         BadInput: they are answers to other questions, naming the first question that has none of them.
     """
-    numbers = {question.seq for question in sheet.questions.values()}
     for seq in answers.lines:
-        if seq not in numbers:
+        if seq not in sheet.by_number:
             first = next(q for q in sheet.questions.values() if q.seq not in answers.lines)
             raise BadInput(
                 f"{answers.places.get(seq, answers.source)}: seq = {seq} is of no question of level"
@@ -197,15 +196,15 @@ class _Recorder(Session):
 
     def __init__(self, sheet: Sheet) -> None:
         super().__init__(_plain)
-        self.introduction = offering(PROFILES[:3], TABLES, LAWS)
         self.case, self._sheet = REJECTS, sheet
+        self.start()
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
         self._sheet.add(self.case, request)
         if self.case.startswith("profile/"):
             at = {"outcome": "horizon", "t": request["t_end"]}
             return {"states": [{**state, **at} for state in request["states"]]}
-        return read_answer(_plain(msgspec.json.encode({**request, "seq": 0})), request["cmd"], 0)
+        return super().ask(request)
 
 
 class _Replay(Session):
@@ -216,10 +215,11 @@ class _Replay(Session):
     def __init__(self, sheet: Sheet, answers: Answers) -> None:
         super().__init__([answers.source])
         self._sheet, self._answers = sheet, answers
-        questions = [q for q in sheet.questions.values() if q.seq in answers.lines and q.case != REJECTS]
+        questions = [q for seq in answers.lines if (q := sheet.by_number[seq]).case != REJECTS]
         seen = {need for q in questions for need in needs(q.request["cmd"], _scene(q.request))}
         every = ("profile", PROFILES), ("table", TABLES), ("law", LAWS)
-        self.introduction = offering(*(tuple(n for n in names if (what, n) in seen) for what, names in every))
+        offered = (tuple(name for name in names if (what, name) in seen) for what, names in every)
+        self.introduction = Introduction(PROTOCOL, "answers in files", "", "unknown", *offered)
 
     def start(self) -> Introduction:
         if self._answers.introduction is None:
@@ -242,11 +242,6 @@ class _Replay(Session):
         self.sent = question.line
         line = _enveloped(line, request["cmd"], question.seq) if line.startswith(b"[") else line
         return with_walls(read_answer(line, request["cmd"], question.seq), request.get("scene"))
-
-
-def offering(profiles: Sequence[str], tables: Sequence[str], laws: Sequence[str]) -> Introduction:
-    """Return the introduction of answers without one."""
-    return Introduction(PROTOCOL, "answers in files", "", "unknown", *map(tuple, (profiles, tables, laws)))
 
 
 def _enveloped(line: bytes, cmd: str, seq: int) -> bytes:
@@ -462,15 +457,13 @@ def read_rows(
 
 def _outcome(place: str, cells: Mapping[str, str]) -> dict[str, Any]:
     """Return a row as an outcome of protocol 1; what it does not hold is left out."""
-    found: dict[str, Any] = {"outcome": cells["outcome"], "reason": cells.get("reason", "")}
-    found |= {"wall": cells["wall"]} if cells.get("wall") else {}
-    for name in (*STATE, "dt"):
-        if cells.get(name):
-            found[name] = read_number(place, name, cells[name])
-    if cells["outcome"] == "horizon" and ("t_in" in cells or "t_out" in cells):
-        ends = [read_number(place, n, cells[n]) for n in ("t_in", "t_out") if cells.get(n)]
-        found["captured"] = ends or None
-    return found
+    words = {name: cells[name] for name in ("wall", "reason") if cells.get(name)}
+    names = (*STATE, "dt", "t_in", "t_out")
+    numbers = {name: read_number(place, name, cells[name]) for name in names if cells.get(name)}
+    ends = [numbers.pop(name) for name in ("t_in", "t_out") if name in numbers]
+    is_told = cells["outcome"] == "horizon" and ("t_in" in cells or "t_out" in cells)
+    captured = {"captured": ends or None} if is_told else {}
+    return {"outcome": cells["outcome"], "reason": "", **words, **numbers, **captured}
 
 
 def read_number(place: str, name: str, text: str) -> float:

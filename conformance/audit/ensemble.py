@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -59,8 +60,6 @@ WAITS = 4  # longest flights between two arc hits, which captures and releases a
 N_LOOKED_AT = 20_000  # particles
 NEARER = 1 / 3  # of theory's distance, that a rival may have
 CLOSE = 0.02  # distance that no chance explains, but that a rival's own error may
-PARTS = (0.25, 0.5, 0.75)  # of a cycle, at which somebody may have stopped
-N_DRAWN = 40_000
 EDGE = 0.02  # of a cycle
 BOUNCE = (
     "phase volume is not kept, and the never captured have wrong energies too: the bounce is not"
@@ -328,6 +327,8 @@ def likely_causes(given: GivenEnsemble, theirs: Theory, found: list[Check]) -> l
     if not wrong:
         return []
     records = list(_told_by_records(given, theirs))
+    if (end := _common_end(given)) is not None:
+        return [*records, f"many stays end together at {end:.3f} of the cycle: it was followed no further"]
     told = [*records, *_told_by_stays(given, theirs, wrong)]
     s = _some(given.s, N_LOOKED_AT)
     distance, reach = gap(s, theirs.cdf), critical_gap(len(s)) + shape_band(theirs)
@@ -364,15 +365,19 @@ def _told_by_records(given: GivenEnsemble, theirs: Theory) -> Iterator[str]:
         yield "nobody is captured: captured particles were dropped, or captures were not looked for"
 
 
+def _common_end(given: GivenEnsemble) -> float | None:
+    """Return the part of the cycle after which no stay goes on, if many last until then."""
+    if given.t_out is None or not np.isfinite(given.t_out).any():
+        return None
+    ends = (given.t_out - cycle_start(given.scene)) / given.scene.period
+    last = float(np.nanmax(ends))
+    return last if last < 1 - 4 * EDGE and float(np.mean(ends > last - EDGE)) > EDGE else None
+
+
 def _told_by_stays(given: GivenEnsemble, theirs: Theory, wrong: set[str]) -> Iterator[str]:
     if not wrong.isdisjoint((STARTS, OUTWARD)):
         yield "starts are not uniform in area: on a wall only, or in one part of the table"
     if given.t_in is None or given.t_out is None or not np.isfinite(given.t_in).any():
-        return
-    span, begin = given.scene.period, cycle_start(given.scene)
-    last = (float(np.nanmax(given.t_out)) - begin) / span
-    if last < 1 - 4 * EDGE and float(np.mean(given.t_out > begin + span * (last - EDGE))) > EDGE:
-        yield f"many stays end together at {last:.3f} of the cycle: it was followed no further"
         return
     if RELEASE in wrong:
         drop = np.nanmean(nu_at(given.scene, given.t_out) - nu_at(given.scene, given.t_in))
@@ -414,13 +419,9 @@ def _rivals(given: GivenEnsemble, theirs: Theory, right_groups: bool) -> Iterato
         "energies return: the loop encloses nothing, as with a law of the wrong frequency",
         lambda s: np.asarray(ndtr((np.asarray(s) - variance / 4) / variance**0.5)),
     )
-    try:
+    with suppress(BadInput, theory.NotConverged):
         turned = expected(backwards(given.scene), given.energy)
         yield Rival("the cycle was run backwards, or with a and b exchanged", turned.cdf)
-        if isinstance(theirs, theory.FiniteEnergy):
-            yield from _other_spans(given, theirs)
-    except (BadInput, theory.NotConverged):
-        return
 
 
 def _share_of_the_free(given: GivenEnsemble, theirs: Theory) -> float:
@@ -431,32 +432,3 @@ def _share_of_the_free(given: GivenEnsemble, theirs: Theory) -> float:
     free, captured = theirs.free_cdf(np.sort(s)), theirs.captured_cdf(np.sort(s))
     steps, apart = (np.arange(len(s)) + 0.5) / len(s) - captured, free - captured
     return float(np.clip(steps @ apart / (apart @ apart), 0.0, 1.0))
-
-
-def _other_spans(given: GivenEnsemble, found: theory.FiniteEnergy) -> Iterator[Rival]:
-    """Yield parts of a cycle, and two cycles."""
-    for part in PARTS:
-        time = part * given.scene.period
-        yield Rival(f"energies are those after {part:g} of a cycle", _at_a_part(given, found, time))
-    yield Rival("energies are those after two cycles", Sums(found.draw(2, N_DRAWN, 0)[:, -1]).cdf)
-
-
-def _at_a_part(given: GivenEnsemble, found: theory.FiniteEnergy, time: float) -> Cdf:
-    """Return the distribution of log E/E0 at a time of the cycle: in the zone, or in the cap since t_in."""
-    begin = cycle_start(given.scene)
-    curve = theory.capture_curve(given.scene, 400)
-    inside = (curve.t_in < begin + time) & (curve.t_out > begin + time)
-    n_in = np.diff(np.append(1 - curve.p_cha, 1 - curve.p_cha[-1]))[inside] if inside.any() else np.zeros(0)
-    mean, variance = found.zone([begin + time])
-    caught, blur = found.at_capture(curve.t_in[inside]) if inside.any() else (np.zeros(0), np.zeros(0))
-    cap = theory.volumes_at(np, given.scene, np.append(curve.t_in[inside], begin + time)).v_cap
-    places = np.append(caught + np.log(cap[:-1] / cap[-1]), mean)
-    widths = np.sqrt(np.append(blur, variance)) + 1e-9
-    weights = np.append(n_in, 1 - n_in.sum())
-
-    def cdf(s: FloatArray) -> FloatArray:
-        grid = np.linspace((places - 6 * widths).min(), (places + 6 * widths).max(), 2000)
-        below = ndtr((grid[:, None] - places) / widths) @ weights
-        return np.asarray(np.interp(s, grid, below))
-
-    return cdf

@@ -236,7 +236,10 @@ def read_table(path: Path, scene: Mushroom, energy: float | None, unit: float) -
     if len(sums) < 2:
         raise BadInput(f"{label}: {len(sums)} energies, must be 2 or more")
     if "captured" in whole:
-        whole["captured"] = _flags(label, whole["captured"])
+        odd = whole["captured"][~np.isin(whole["captured"], (0, 1))]
+        if len(odd):
+            raise BadInput(f"{label}: captured = {odd[0]}, must be 0 or 1")
+        whole["captured"] = whole["captured"].astype(bool)
     assert one is not None
     whole |= {"n_lost": n_lost, "is_binary32": is_binary32 and len(np.unique(sums[:1000])) > 2}
     whole |= {"later": sums[:, 1:]} if sums.shape[1] > 1 else {}
@@ -250,17 +253,11 @@ def _is_start(label: str, start: Floats, energy: float, *, is_asked: bool) -> np
         raise BadInput(f"{label}: E0 = {bad[0]}, must be finite and > 0")
     found = np.abs(start / energy - 1) < SAME
     if not (is_asked or found.all()):
-        other = start[~found][0]
-        why = "an audit is of starts of one energy, --energy picks them"
-        raise BadInput(f"{label}: E0 takes several values, {energy:g} and {other:g} among them: {why}")
+        raise BadInput(
+            f"{label}: E0 takes several values, {energy:g} and {start[~found][0]:g} among them:"
+            " an audit is of starts of one energy, --energy picks them"
+        )
     return np.asarray(found)
-
-
-def _flags(label: str, captured: Floats) -> npt.NDArray[np.bool_]:
-    odd = captured[(captured != 0) & (captured != 1)]
-    if len(odd):
-        raise BadInput(f"{label}: captured = {odd[0]}, must be 0 or 1")
-    return captured.astype(bool)
 
 
 def _parts(path: Path, label: str) -> Iterator[dict[str, Floats]]:

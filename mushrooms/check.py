@@ -316,9 +316,7 @@ def grade_file(answers: Path, questions: Path | None, level: str, seed: int | No
         if seed not in (None, sheet.seed):
             raise BadInput(f"--seed = {seed}, must be {sheet.seed}, that of the questions")
         return grade_answers(sheet, found)
-    written_with = signed(found.echoes)
-    if written_with is None and seed is None:
+    written_with = signed(found.echoes) if seed is None else (level, seed)
+    if written_with is None:
         raise BadInput("--answers: give --questions, or the --seed and --level that they were written with")
-    level, seed = written_with if written_with is not None and seed is None else (level, seed)
-    assert seed is not None
-    return grade_answers(Sheet(level, seed), found)
+    return grade_answers(Sheet(*written_with), found)

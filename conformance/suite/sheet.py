@@ -141,14 +141,12 @@ class Sheet(RunQuestions):
 
     def lines(self) -> list[bytes]:
         """Return the questions as a program of protocol 1 reads them, `start` and `stop` included."""
+        # A program that echoes seed and level hands them back.
+        signature = [float(self.seed // WORD), float(self.seed % WORD), float(LEVELS.index(self.level))]
         hello = {"cmd": "start", "protocol": PROTOCOL}
-        numbers = [{"cmd": "echo", "values": values} for values in (self.signature(), probe_values())]
+        numbers = [{"cmd": "echo", "values": values} for values in (signature, probe_values())]
         begin, end = map(msgspec.json.encode, [hello, *numbers]), msgspec.json.encode({"cmd": "stop"})
         return [*begin, *(question.line for question in self.questions.values()), end]
-
-    def signature(self) -> list[float]:
-        """Return seed and level as numbers, which a program that echoes them hands back."""
-        return [float(self.seed // WORD), float(self.seed % WORD), float(LEVELS.index(self.level))]
 
 
 def signed(echoes: Sequence[bytes]) -> tuple[str, int] | None:
@@ -216,7 +214,8 @@ class _Replay(Session):
         super().__init__([answers.source])
         self._sheet, self._answers = sheet, answers
         questions = [q for seq in answers.lines if (q := sheet.by_number[seq]).case != REJECTS]
-        seen = {need for q in questions for need in needs(q.request["cmd"], _scene(q.request))}
+        asked = [(q.request["cmd"], q.request["scene"]) for q in questions]
+        seen = {need for cmd, scene in asked for need in needs(cmd, scene if "table" in scene else None)}
         every = ("profile", PROFILES), ("table", TABLES), ("law", LAWS)
         offered = (tuple(name for name in names if (what, name) in seen) for what, names in every)
         self.introduction = Introduction(PROTOCOL, "answers in files", "", "unknown", *offered)
@@ -252,11 +251,6 @@ def _enveloped(line: bytes, cmd: str, seq: int) -> bytes:
     )
     whole = parts[0] if is_whole else {"states" if cmd == "flow" else "steps": parts}
     return msgspec.json.encode({"seq": seq, **whole})
-
-
-def _scene(request: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    scene = request.get("scene")
-    return scene if isinstance(scene, Mapping) and "table" in scene else None
 
 
 def _plain(line: bytes) -> bytes:

@@ -29,7 +29,7 @@ CAUSES = {
     "E in place of log E": "E1/E0 is given in place of its logarithm",
     "starts on the wall": "starts are not uniform in area",
     "misprinted protocol": "the loop encloses nothing",
-    "half a period": "many stays end together at 0.500 of the cycle",
+    "half a period": "many captures end together at 0.500 of the cycle",
     "slope 1/9": "",  # moves m1 by 7e-6, which 1e11 particles would show
 }
 

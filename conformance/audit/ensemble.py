@@ -6,7 +6,7 @@ theory only; then a band is granted that no rates confirm, (walls' speed / parti
 of the first correction.
 
 Where a check fails, rivals tell what is likely wrong: each is a mistake that people make, known by what it
-does to log E1/E0 or to the stays. One is named when the whole distribution is within chance of its own, and
+does to log E1/E0 or to the capture intervals. One is named when the whole distribution is within chance of its own, and
 no more than a third as far off as theory's.
 
 Not handled: starts of several energies, tables other than mushrooms.
@@ -75,7 +75,7 @@ class GivenEnsemble(NamedTuple):
         energy: of every start, v^2 / 2 in the scene's units.
         s: (n,) log E1 / E0.
         captured: (n,) which were captured; None where nothing tells.
-        t_in, t_out: (n,) begin and end of a stay in the scene's time; nan for none; None where not given.
+        t_in, t_out: (n,) ends of the capture interval in the scene's time; nan for none; None where not given.
         x0, y0: (n,) where each started; None where not given.
         n_lost: rows without an energy, or particles without a row.
         is_binary32: whether every energy is a number of 24 bits.
@@ -166,7 +166,7 @@ def checks(given: GivenEnsemble, theirs: Theory) -> list[Check]:
         *_starts(given),
         *_energies(given, theirs),
         *_captures(given, theirs),
-        *_stays(given, theirs),
+        *_capture_intervals(given, theirs),
         *_later(given, theirs),
     ]
 
@@ -258,7 +258,7 @@ def _captures(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
         yield fits(CAPTURED, _some(caught), theirs.captured_cdf, band=band, scale=0.4)
 
 
-def _stays(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
+def _capture_intervals(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     if given.t_in is None or theirs.p_nc == 1:
         return
     t_in = given.t_in[np.isfinite(given.t_in)]
@@ -328,8 +328,8 @@ def likely_causes(given: GivenEnsemble, theirs: Theory, found: list[Check]) -> l
         return []
     records = list(_told_by_records(given, theirs))
     if (end := _common_end(given)) is not None:
-        return [*records, f"many stays end together at {end:.3f} of the cycle: it was followed no further"]
-    told = [*records, *_told_by_stays(given, theirs, wrong)]
+        return [*records, f"many captures end together at {end:.3f} of the cycle: it was followed no further"]
+    told = [*records, *_told_by_captures(given, theirs, wrong)]
     s = _some(given.s, N_LOOKED_AT)
     distance, reach = gap(s, theirs.cdf), critical_gap(len(s)) + shape_band(theirs)
     if distance <= reach:
@@ -366,7 +366,7 @@ def _told_by_records(given: GivenEnsemble, theirs: Theory) -> Iterator[str]:
 
 
 def _common_end(given: GivenEnsemble) -> float | None:
-    """Return the part of the cycle after which no stay goes on, if many last until then."""
+    """Return the part of the cycle after which no capture interval goes on, if many last until then."""
     if given.t_out is None or not np.isfinite(given.t_out).any():
         return None
     ends = (given.t_out - cycle_start(given.scene)) / given.scene.period
@@ -374,7 +374,7 @@ def _common_end(given: GivenEnsemble) -> float | None:
     return last if last < 1 - 4 * EDGE and float(np.mean(ends > last - EDGE)) > EDGE else None
 
 
-def _told_by_stays(given: GivenEnsemble, theirs: Theory, wrong: set[str]) -> Iterator[str]:
+def _told_by_captures(given: GivenEnsemble, theirs: Theory, wrong: set[str]) -> Iterator[str]:
     if not wrong.isdisjoint((STARTS, OUTWARD)):
         yield "starts are not uniform in area: on a wall only, or in one part of the table"
     if given.t_in is None or given.t_out is None or not np.isfinite(given.t_in).any():

@@ -1,7 +1,7 @@
 """`mushrooms audit --ensemble`: an ensemble of another program, held to the paper; one page of it.
 
 It is read a part at a time from CSV, Parquet or Zarr. A row is a particle. Columns: E0, E1, E2 ... after each
-cycle, or s = log E1/E0; where there are any, t_in and t_out (ends of the capture interval in the first cycle),
+cycle, or s = log E1/E0; where there are any, t_in and t_out (ends of the first cycle's capture interval),
 captured (0 or 1), and x0, y0, where it started. The names that `mushrooms export` writes will do.
 """
 

@@ -6,8 +6,8 @@ theory only; then a band is granted that no rates confirm, (walls' speed / parti
 of the first correction.
 
 Where a check fails, rivals tell what is likely wrong: each is a mistake that people make, known by what it
-does to log E1/E0 or to the capture intervals. One is named when the whole distribution is within chance of its own, and
-no more than a third as far off as theory's.
+does to log E1/E0 or to the capture intervals. One is named when the whole distribution is within chance of
+its own, and no more than a third as far off as theory's.
 
 Not handled: starts of several energies, tables other than mushrooms.
 """
@@ -75,7 +75,7 @@ class GivenEnsemble(NamedTuple):
         energy: of every start, v^2 / 2 in the scene's units.
         s: (n,) log E1 / E0.
         captured: (n,) which were captured; None where nothing tells.
-        t_in, t_out: (n,) ends of the capture interval in the scene's time; nan for none; None where not given.
+        t_in, t_out: (n,) ends of the capture interval [scene's time]; nan for none; None where not given.
         x0, y0: (n,) where each started; None where not given.
         n_lost: rows without an energy, or particles without a row.
         is_binary32: whether every energy is a number of 24 bits.

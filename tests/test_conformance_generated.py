@@ -32,8 +32,7 @@ from conformance.cases.generated import (
 from conformance.cases.run_families import WALLS
 from conformance.cases.scenes import many_legs
 from conformance.cases.table import FAMILIES
-from conformance.grading.agreement import middle
-from conformance.grading.grade import SHARP, grade
+from conformance.grading.agreement import SHARP, grade, middle
 from conformance.plain.step import PlainPath
 from conformance.suite.checks import checks_of
 from conformance.suite.symmetry import Transform, draw_transform

@@ -7,8 +7,7 @@ import msgspec
 import pytest
 from support.truth import certified_answer
 
-from conformance.grading.agreement import physics_bound
-from conformance.grading.grade import grade, precision_class
+from conformance.grading.agreement import grade, physics_bound, precision_class
 from conformance.vectors import NUMBERS, Certified, Expectation, Vector, load
 from scene import State
 

@@ -9,7 +9,7 @@ no answer.
 A level says how delicate a question is. It depends on the condition number (the largest relative change of an
 answer per relative change of the inputs), and on the effect of a small change of the inputs:
     core      condition <= 1e6, and a relative change of 2^-30 in every input leaves the walls met the same.
-              An answer that passes (backward error 1e-9, see `grading.grade`) is then right to three
+              An answer that passes (backward error 1e-9, see `grading.agreement`) is then right to three
               digits. A simple stepper that loses twice the necessary digits (at worst 1e6^2 u = 1e-4 in
               the answer, 1e6 u = 1e-10 backward) still passes.
     extended  condition <= 1e12, walls the same under a change of 2^-44. A backward stable stepper in

@@ -1,34 +1,64 @@
-"""`mushrooms audit --ensemble`: an ensemble of another program, held to the paper; one page of it."""
+"""`mushrooms audit --ensemble`: an ensemble of another program, held to the paper; one page of it.
+
+It is read a part at a time from CSV, Parquet or Zarr. A row is a particle. Columns: E0, E1, E2 ... after each
+cycle, or s = log E1/E0; where there are any, t_in and t_out (ends of the first cycle's capture interval),
+captured (0 or 1), and x0, y0, where it started. The names that `mushrooms export` writes will do.
+"""
 
 from __future__ import annotations
 
+import csv
 import json
+import re
+from collections.abc import Iterable, Iterator
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+import zarr
 
-from conformance.audit.causes import likely_causes
 from conformance.audit.claim import Check
 from conformance.audit.ensemble import (
     GivenEnsemble,
+    HighEnergies,
     checks,
     cycle_start,
     expected,
-    nu_at,
+    gap,
+    likely_causes,
     reversal,
 )
 from conformance.audit.runs import scene_named
 from conformance.files import write_files
+from conformance.suite.sheet import read_number, read_rows
 from mushrooms import output
-from mushrooms.ensemble_table import read_table
+from mushrooms.output import import_arrow
 from mushrooms.reports.page import pull
-from scene.refusal import BadInput
+from scene.refusal import BadInput, shown
 from scene.tables import Mushroom
 
-ENERGIES = {"v2/2": 1.0, "v2": 0.5}  # what an energy of 1 in a file is as v^2/2
+Floats = npt.NDArray[np.float64]
+UNITS = {"v2/2": 1.0, "v2": 0.5}  # what an energy of 1 in a file is as v^2/2
 TIMES = ("scene", "cycles")
 TOUCH = 0.05  # of a cycle, by which times may lie outside the capture that theory has
+PART, FEW = 500_000, 20_000  # rows read at a time: as arrays, and as texts
+SAME = 1e-6  # relative difference of E0 that writing it in few digits makes
+NOTHING = ("", "nan", "NaN", "NA", "null", "none", "None")
+FLAGS = {"true": "1", "false": "0", "t": "1", "f": "0", "yes": "1", "no": "0"}
+ENERGIES, GAIN = "E1", "s"
+# What a column may be called; of several minima of nu or capture intervals the earliest counts.
+NAMES = {
+    "E0": r"E_?0|e0|energy_?0",
+    ENERGIES: r"E_?[1-9]\d*|e[1-9]\d*|energy(_[1-9]\d*)?",
+    GAIN: r"s|log_E1_E0|log_gain",
+    "t_in": r"t_in(_1(_\d+)?)?",
+    "t_out": r"t_out(_1(_\d+)?)?",
+    "captured": r"(is_)?captured(_1)?",
+    "x0": "x_?0",
+    "y0": "y_?0",
+}
 
 
 class Options(NamedTuple):
@@ -64,20 +94,21 @@ def audit_ensemble(
     found = scene_named(scene_name)
     if not isinstance(found, Mushroom) or not found.period:
         raise BadInput(f"--scene = {scene_name!r}, must be a mushroom that moves: theory has no other")
-    if options.energy_unit not in ENERGIES:
-        raise BadInput(f"--energy-unit = {options.energy_unit!r}, must be one of {', '.join(ENERGIES)}")
+    if options.energy_unit not in UNITS:
+        raise BadInput(f"--energy-unit = {options.energy_unit!r}, must be one of {', '.join(UNITS)}")
     if options.time_unit not in (None, *TIMES):
         raise BadInput(f"--time-unit = {options.time_unit!r}, must be one of {', '.join(TIMES)}")
     with output.writable_folder(out) as folder:
         result = examine(path, found, reversed_path, options)
         data = to_data(result, path, scene_name)
-        texts = {
-            "report.json": json.dumps(data, indent=1, ensure_ascii=False) + "\n",
-            "report.txt": to_text(data),
-        }
         from mushrooms.reports import ensemble_page  # it draws, and drawing takes a second to import
 
-        write_files(folder, {**texts, "report.html": ensemble_page.to_html(data, result.given)})
+        texts = {
+            "report.json": json.dumps(data, indent=1, ensure_ascii=False) + "\n",
+            "report.txt": ensemble_page.to_text(data),
+            "report.html": ensemble_page.to_html(data, result.given),
+        }
+        write_files(folder, texts)
     print(texts["report.json" if as_json else "report.txt"], end="")
     if not as_json:
         print(f"Report: {folder / 'report.html'}")
@@ -92,10 +123,10 @@ def examine(path: Path, scene: Mushroom, reversed_path: Path | None, options: Op
     if reversed_path is not None:
         other, _ = read(reversed_path, scene, options._replace(particles=None))
         found.append(reversal(given, other, theirs))
-    if not theirs.has_rates:
+    if isinstance(theirs, HighEnergies):
         notes.append(
             "no frozen rates of this scene: finite energy is not in the theory, and"
-            f" {theirs.bands['mean_s']:.2g} is granted for it, a guess by (walls' speed / v)^(2/3)"
+            f" {theirs.theory_error.mean_s:.2g} is granted for it, a guess by (walls' speed / v)^(2/3)"
         )
         found = [c._replace(holds=None) if c.holds is False and c.band else c for c in found]
     return EnsembleAudit(given, found, likely_causes(given, theirs, found), notes)
@@ -103,89 +134,46 @@ def examine(path: Path, scene: Mushroom, reversed_path: Path | None, options: Op
 
 def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, list[str]]:
     """Return an ensemble in the scene's units, and what was taken for granted."""
-    unit = ENERGIES[options.energy_unit]
-    energy = None if options.energy is None else options.energy * unit
-    table = read_table(path, energy, unit)
-    energy = table.energy
+    given, n_other = read_table(path, scene, options.energy, UNITS[options.energy_unit])
     form = options.energy_unit.replace("v2", "v²")
-    notes = [f"energies are taken as {form}, lengths in the scene's unit: E0 = {energy:g} as v²/2"]
-    if table.n_other:
-        notes.append(f"{table.n_other:,} rows of another E0 are left out")
-    t_in, t_out, more = _times(scene, table.columns, options.time_unit)
-    captured = table.columns.get("captured")
-    if captured is None and t_in is not None:
-        captured = np.isfinite(t_in)
-        more = [*more, "captured are those with a t_in"]
-    elif captured is not None:
-        _check_flags(path, captured)
-    n_lost = table.n_lost
+    notes = [f"energies are taken as {form}, lengths in the scene's unit: E0 = {given.energy:g} as v²/2"]
+    if n_other:
+        notes.append(f"{n_other:,} rows of another E0 are left out")
+    if given.t_in is not None and np.isfinite(given.t_in).any():
+        unit, how = (options.time_unit, "as said") if options.time_unit else (_unit(given), "inferred")
+        size = scene.period if unit == "cycles" else 1.0
+        t_out = None if given.t_out is None else given.t_out * size
+        given = given._replace(t_in=given.t_in * size, t_out=t_out)
+        told = "as parts of a cycle" if unit == "cycles" else "in the unit of the scene"
+        notes.append(f"times are taken {told}, {how}")
+    if given.captured is None and given.t_in is not None:
+        given = given._replace(captured=np.isfinite(given.t_in))
+        notes.append("captured are those with a t_in")
     if options.particles is not None:
-        n_there = len(table.sums) + n_lost
-        if options.particles < n_there:
-            raise BadInput(f"--particles = {options.particles}, must be at least the {n_there} rows")
-        n_lost += options.particles - n_there
-    x0, y0 = (table.columns.get(name) for name in ("x0", "y0"))
-    flags = None if captured is None else captured.astype(bool)
-    return (
-        GivenEnsemble(
-            scene,
-            energy,
-            table.sums[:, 0],
-            flags,
-            t_in,
-            t_out,
-            x0,
-            y0,
-            n_lost,
-            table.is_binary32,
-            table.sums[:, 1:] if table.sums.shape[1] > 1 else None,
-        ),
-        [*notes, *more],
-    )
+        n_rows = len(given.s) + given.n_lost
+        if options.particles < n_rows:
+            raise BadInput(f"--particles = {options.particles}, must be at least the {n_rows} rows")
+        given = given._replace(n_lost=options.particles - len(given.s))
+    return given, notes
 
 
-def _check_flags(path: Path, captured: Any) -> None:
-    odd = captured[(captured != 0) & (captured != 1)]
-    if len(odd):
-        raise BadInput(f"--ensemble {str(path)!r}: captured = {odd[0]}, must be 0 or 1")
-
-
-def _times(scene: Mushroom, columns: dict[str, Any], unit: str | None) -> tuple[Any, Any, list[str]]:
-    """Return times of stays in the scene's unit, by what is said or by where theory has captures."""
-    t_in, t_out = columns.get("t_in"), columns.get("t_out")
-    known = np.empty(0) if t_in is None else t_in[np.isfinite(t_in)]
-    if t_in is None or not len(known):
-        return t_in, t_out, []
-    begin, span = cycle_start(scene), scene.period
+def _unit(given: GivenEnsemble) -> str:
+    """Return the unit in which times are in the cycle; of two that in which they are nearer to theory's."""
+    begin, span = cycle_start(given.scene), given.scene.period
+    known = np.empty(0) if given.t_in is None else given.t_in[np.isfinite(given.t_in)]
     low, high = float(known.min()), float(known.max())
-    fitting = [
-        name
-        for name, size in zip(TIMES, (1.0, span), strict=True)
-        if begin - TOUCH * span <= low * size and high * size <= begin + (1 + TOUCH) * span
-    ]
-    if unit is None:
-        if not fitting:
-            raise BadInput(
-                f"t_in = {low:g} to {high:g}, must be in the cycle, {begin:g} to {begin + span:g} in the"
-                " scene's time, or 0 to 1 in cycles: --time-unit says which"
-            )
-        # A share of a cycle looks like the scene's time too, when nothing is later than 1.
-        is_share = "cycles" in fitting and span > 2 and high <= 1 and _falls(scene, known * span, known)
-        unit = "cycles" if is_share or "scene" not in fitting else "scene"
-        how = "inferred"
-    else:
-        how = "as said"
-    note = (
-        f"times are taken {'as parts of a cycle' if unit == 'cycles' else 'in the unit of the scene'}, {how}"
-    )
-    size = span if unit == "cycles" else 1.0
-    return t_in * size, None if t_out is None else t_out * size, [note]
-
-
-def _falls(scene: Mushroom, times: Any, rather_than: Any) -> bool:
-    """Tell whether the mouth narrows over all of some times, and is wider at the first of the others."""
-    nu = nu_at(scene, np.quantile(times, (0.02, 0.98)))
-    return bool(nu[0] > nu[1]) and float(nu_at(scene, np.array([rather_than.max()]))[0]) > nu[1]
+    sizes = dict(zip(TIMES, (1.0, span), strict=True))
+    least, most = begin - TOUCH * span, begin + (1 + TOUCH) * span
+    fitting = [unit for unit, size in sizes.items() if least <= low * size and high * size <= most]
+    if not fitting:
+        raise BadInput(
+            f"t_in = {low:g} to {high:g}, must be in the cycle, {begin:g} to {begin + span:g} in the"
+            " scene's time, or 0 to 1 in cycles: --time-unit says which"
+        )
+    theirs = expected(given.scene, given.energy)
+    if len(fitting) == 1 or theirs.p_nc == 1:
+        return fitting[0]
+    return min(fitting, key=lambda unit: gap(known * sizes[unit], theirs.capture_cdf))
 
 
 def to_data(result: EnsembleAudit, path: Path, scene_name: str) -> dict[str, Any]:
@@ -205,29 +193,156 @@ def to_data(result: EnsembleAudit, path: Path, scene_name: str) -> dict[str, Any
     }
 
 
-def to_text(data: dict[str, Any]) -> str:
-    """Return the report as lines."""
-    words = {True: "holds", False: "FAILS", None: "open"}
-    lines = [f"{data['ensemble']} against {data['scene']}: {data['verdict']}"]
-    lines.append(f"{data['particles']:,} particles, {data['lost']:,} without an energy")
-    lines += [f"note: {note}" for note in data["notes"]]
-    for check in data["checks"]:
-        lines.append(f"{words[check['holds']]:5}  {check['what']}: {said(check)}")
-    lines += [f"likely cause: {cause}" for cause in data["causes"]]
-    if data["verdict"] == "refuted" and not data["causes"]:
-        lines.append("likely cause: none of those that are known")
-    return "\n".join(lines) + "\n"
+def read_table(path: Path, scene: Mushroom, energy: float | None, unit: float) -> tuple[GivenEnsemble, int]:
+    """Read an ensemble, its times as they are written.
+
+    Args:
+        path: a .csv or .parquet file, or a .zarr folder, or a folder that holds ensemble.zarr.
+        scene: that is claimed to have been simulated.
+        energy: of the rows to read where E0 has several, or of all where there is no E0, in the file's unit.
+        unit: v^2/2 of an energy of 1 in the file.
+
+    Returns:
+        The ensemble, and the number of rows of another E0 than was asked for.
+
+    Raises:
+        BadInput: in one line, naming the column or the place.
+    """
+    label, n_lost, n_other, is_binary32 = f"--ensemble {str(path)!r}", 0, 0, True
+    kept: dict[str, list[Floats]] = {"sums": []}
+    one = energy
+    for part in _parts(path, label):
+        start = np.full(len(next(iter(part.values()))), energy, float)
+        if "E0" in part:
+            start = part.pop("E0")
+            one = float(start[0]) if one is None else one
+            chosen = _is_start(label, start, one, is_asked=energy is not None)
+            n_other += int(np.sum(~chosen))
+            start, part = start[chosen], {name: column[chosen] for name, column in part.items()}
+        elif energy is None:
+            raise BadInput(f"{label}: column 'E0' is missing, and so is --energy, v^2/2 of every start")
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            after = part.pop(ENERGIES, np.empty((0, 1)))
+            sums = part.pop(GAIN)[:, None] if GAIN in part else np.log(after / start[:, None])
+            is_binary32 &= bool(after.size) and not np.any(np.abs(after - after.astype(np.float32)) > 0)
+        followed = np.isfinite(sums).all(axis=1)
+        n_lost += int(np.sum(~followed))
+        for name, column in {**part, "sums": sums}.items():
+            kept.setdefault(name, []).append(column[followed])
+    whole: dict[str, Any] = {
+        name: np.concatenate(kept.pop(name) or [np.empty((0, 1))]) for name in list(kept)
+    }
+    sums = whole.pop("sums")
+    if len(sums) < 2:
+        raise BadInput(f"{label}: {len(sums)} energies, must be 2 or more")
+    if "captured" in whole:
+        odd = whole["captured"][~np.isin(whole["captured"], (0, 1))]
+        if len(odd):
+            raise BadInput(f"{label}: captured = {odd[0]}, must be 0 or 1")
+        whole["captured"] = whole["captured"].astype(bool)
+    assert one is not None
+    whole |= {"n_lost": n_lost, "is_binary32": is_binary32 and len(np.unique(sums[:1000])) > 2}
+    whole |= {"later": sums[:, 1:]} if sums.shape[1] > 1 else {}
+    return GivenEnsemble(scene, one * unit, sums[:, 0], **whole), n_other
 
 
-def said(check: dict[str, Any]) -> str:
-    """Return what was found, what is expected, and what the comparison is worth."""
-    if check["value"] is None:
-        return f"{check['note']}, must be {check['expected']}"
-    parts = [f"{check['value']:.6g}"]
-    parts[0] += f" ± {check['error']:.2g}" if check["error"] else ""
-    expected_value = check["expected"] if check["error"] is None else f"{float(check['expected']):.6g}"
-    parts.append(f"theory {expected_value}" + (f", left out {check['band']:.2g}" if check["band"] else ""))
-    parts += [f"pull {check['pull']:+.1f}"] if check["pull"] is not None else []
-    parts += [f"would see {check['sees']:.2g}"] if check["sees"] is not None else []
-    parts += [f"power {check['power']:.2f} against {check['against']}"] if check["power"] is not None else []
-    return "; ".join(parts)
+def _is_start(label: str, start: Floats, energy: float, *, is_asked: bool) -> npt.NDArray[np.bool_]:
+    """Tell which rows have an E0; all must, unless it was asked for."""
+    bad = start[~(np.isfinite(start) & (start > 0))]
+    if len(bad):
+        raise BadInput(f"{label}: E0 = {bad[0]}, must be finite and > 0")
+    found = np.abs(start / energy - 1) < SAME
+    if not (is_asked or found.all()):
+        raise BadInput(
+            f"{label}: E0 takes several values, {energy:g} and {start[~found][0]:g} among them:"
+            " an audit is of starts of one energy, --energy picks them"
+        )
+    return np.asarray(found)
+
+
+def _parts(path: Path, label: str) -> Iterator[dict[str, Floats]]:
+    """Yield parts of a table by what its columns are: (n, K) the energies after K cycles, (n,) all others."""
+    readers = {".csv": _csv, ".parquet": _parquet, ".zarr": _zarr}
+    path = path / "ensemble.zarr" if (path / "ensemble.zarr").is_dir() else path
+    if path.suffix not in readers:
+        raise BadInput(f"{label}, must be a .csv or .parquet file, or a .zarr folder")
+    try:
+        for raw in readers[path.suffix](path, label):
+            named = {what: [raw[name] for name in names] for what, names in _find_columns(label, raw).items()}
+            stacked = {what: np.column_stack(columns) for what, columns in named.items()}
+            yield {
+                what: column if what == ENERGIES else np.asarray(np.fmin.reduce(column, axis=1))
+                for what, column in stacked.items()
+            }
+    except OSError as error:
+        raise BadInput(f"{label} cannot be read: {error.strerror or error}") from None
+
+
+def _find_columns(label: str, names: Iterable[str]) -> dict[str, list[str]]:
+    """Return the columns of a table that are needed, by what they are; cycles in their order."""
+    given = list(names)
+    names = sorted(given, key=lambda name: (len(name), name))
+    twice = [name for name, following in pairwise(names) if name == following]
+    found = {what: [n for n in names if re.fullmatch(form, n)] for what, form in NAMES.items()}
+    problem = f"column {shown(twice[0])} stands twice" if twice else ""
+    if not (problem or found[ENERGIES] or found[GAIN]):
+        problem = f"column 'E1' is missing, as is 's'; it has {', '.join(given[:8])}"
+    if problem:
+        raise BadInput(f"{label}: {problem}")
+    return {what: columns for what, columns in found.items() if columns}
+
+
+def _select_columns(label: str, names: Iterable[str]) -> list[str]:
+    return [name for columns in _find_columns(label, names).values() for name in columns]
+
+
+def _csv(path: Path, label: str) -> Iterator[dict[str, Floats]]:
+    """Yield parts of a CSV file: by Arrow where it is installed and numbers are decimal, else by cells."""
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        header = [name.strip() for name in next(csv.reader(file), [])]
+    wanted, n_done = _select_columns(label, header), 0
+    try:
+        from pyarrow import csv as arrow
+
+        options = arrow.ConvertOptions(
+            include_columns=wanted, column_types=dict.fromkeys(wanted, "float64"), null_values=list(NOTHING)
+        )
+        reading = arrow.ReadOptions(column_names=header, skip_rows=1, block_size=2**24)
+        for batch in arrow.open_csv(path, reading, convert_options=options):
+            yield {name: batch.column(name).to_numpy(zero_copy_only=False) for name in wanted}
+            n_done += len(batch)
+    except (ImportError, ValueError):  # the cells tell what is wrong, and where
+        rows = islice(read_rows(path, label, wanted), n_done, None)
+        while some := list(islice(rows, FEW)):
+            yield {name: np.array([_cell(place, name, row[name]) for place, row in some]) for name in wanted}
+
+
+def _cell(place: str, name: str, word: str) -> float:
+    return float("nan") if word in NOTHING else read_number(place, name, FLAGS.get(word.lower(), word))
+
+
+def _parquet(path: Path, label: str) -> Iterator[dict[str, Floats]]:
+    arrow, parquet = import_arrow()
+    try:
+        with parquet.ParquetFile(path) as file:
+            wanted = _select_columns(label, file.schema_arrow.names)
+            for batch in file.iter_batches(PART, columns=wanted):
+                columns = ((name, batch.column(name).cast("float64")) for name in wanted)
+                yield {name: column.to_numpy(zero_copy_only=False) for name, column in columns}
+    except (arrow.ArrowInvalid, arrow.ArrowNotImplementedError) as error:
+        raise BadInput(f"{label}: {error}") from None
+
+
+def _zarr(path: Path, label: str) -> Iterator[dict[str, Floats]]:
+    try:
+        group: Any = zarr.open_group(path, mode="r")
+    except (OSError, ValueError, KeyError) as error:
+        raise BadInput(f"{label} is no Zarr group: {error}") from None
+    arrays = {name: group[name] for name in _select_columns(label, group.array_keys())}
+    lengths = {name: array.shape[0] if array.ndim else 1 for name, array in arrays.items()}
+    if len(set(lengths.values())) > 1:
+        raise BadInput(f"{label}: arrays of {lengths} particles, must be as many in each")
+    for first in range(0, next(iter(lengths.values())), PART):
+        part = {name: np.asarray(array[first : first + PART], np.float64) for name, array in arrays.items()}
+        is_first = {name: name.startswith("energy") or values.ndim == 1 for name, values in part.items()}
+        yield {name: values if is_first[name] else values[:, 0] for name, values in part.items()}

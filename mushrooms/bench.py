@@ -14,10 +14,10 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 import fast
-from conformance.bench import baselines, growth, record, solvers, workloads
+from conformance.bench import baselines, record, solvers, workloads
 from conformance.bench.record import Record, Size, quartiles
 from conformance.bench.solvers import Family, Solver, by_command
-from conformance.cases.prover import proved_step
+from conformance.cases.certify import proved_step
 from conformance.files import Writer, write_files
 from conformance.harness.examples import find_examples
 from conformance.suite.process import CheckFailure
@@ -111,7 +111,7 @@ def _measure(size: Size, seed: int, command: list[str]) -> Record:
             tick("")
         n_paths, length = PATHS[size]
         bar.reset(task, total=n_paths, description="error growth")
-        grown = growth.grow(ours.our_followers(), proved_step, ours.prove_path, seed, n_paths, length, tick)
+        grown = solvers.grow(ours.our_followers(), proved_step, ours.prove_path, seed, n_paths, length, tick)
     return record.Record(
         format=record.FORMAT,
         size=size,

@@ -8,11 +8,18 @@ import time
 import fast
 import reference
 from conformance import plain
-from conformance.bench.growth import FAR, PathFollower, PathPoint, Sensitivity
-from conformance.bench.solvers import Solver, SolverAnswer, SolverRun, by_call
+from conformance.bench.solvers import (
+    FAR,
+    PathFollower,
+    PathPoint,
+    Sensitivity,
+    Solver,
+    SolverAnswer,
+    SolverRun,
+    by_call,
+)
 from conformance.bench.workloads import FLIGHTS, Workload
-from conformance.cases.certify import Links
-from conformance.cases.prover import collided
+from conformance.cases.certify import Links, collided
 from conformance.grading.agreement import Answer, Enclosed, exact
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from scene import Collision, Scene, State

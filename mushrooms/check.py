@@ -18,11 +18,19 @@ from rich.table import Table
 
 from conformance import suite
 from conformance.files import write_file
-from conformance.suite import reports, sheet_files
+from conformance.suite import reports
 from conformance.suite.result import VERDICTS, Run
 from conformance.suite.run import NEW_SEEDS, choose
 from conformance.suite.session import Limits
-from conformance.suite.sheet import Sheet, grade_answers, signed
+from conformance.suite.sheet import (
+    Sheet,
+    grade_answers,
+    read_answers,
+    read_key,
+    signed,
+    write_lines,
+    write_tables,
+)
 from mushrooms import output
 from mushrooms.terminal import new_console, progress_bar, refuse_unheeded
 from scene.refusal import MAX_SEED, BadInput
@@ -276,7 +284,7 @@ def write_questions(path: Path, level: str, seed: int | None) -> None:
     if path.suffix == ".jsonl":
         output.check_file(path, (".jsonl",))
         sheet = Sheet(level, seed)
-        n = sheet_files.write_lines(sheet, path)
+        n = write_lines(sheet, path)
     elif path.suffix:
         raise BadInput(f"--questions = {str(path)!r}, must end in .jsonl, or be a folder for CSV")
     else:
@@ -284,7 +292,7 @@ def write_questions(path: Path, level: str, seed: int | None) -> None:
             if any(folder.iterdir()):
                 raise BadInput(f"--questions = {str(path)!r} is not empty, must be a new folder")
             sheet = Sheet(level, seed)
-            n = sheet_files.write_tables(sheet, folder)
+            n = write_tables(sheet, folder)
     more = f", {len(sheet.questions) - n} left out that CSV cannot hold" if n < len(sheet.questions) else ""
     print(f"{n} questions of level {level} and seed {seed}{more}: {path}")
     print(f"Grade the answers with: mushrooms check --questions {path} --answers FILE")
@@ -302,15 +310,13 @@ def grade_file(answers: Path, questions: Path | None, level: str, seed: int | No
     Raises:
         BadInput: in one line.
     """
-    found = sheet_files.read_answers(answers)
+    found = read_answers(answers)
     if questions is not None:
-        sheet = sheet_files.read_key(questions)
+        sheet = read_key(questions)
         if seed not in (None, sheet.seed):
             raise BadInput(f"--seed = {seed}, must be {sheet.seed}, that of the questions")
         return grade_answers(sheet, found)
-    written_with = signed(found.echoes)
-    if written_with is None and seed is None:
+    written_with = signed(found.echoes) if seed is None else (level, seed)
+    if written_with is None:
         raise BadInput("--answers: give --questions, or the --seed and --level that they were written with")
-    level, seed = written_with if written_with is not None and seed is None else (level, seed)
-    assert seed is not None
-    return grade_answers(Sheet(level, seed), found)
+    return grade_answers(Sheet(*written_with), found)

@@ -45,7 +45,7 @@ def _fewer():
         for module in (broadened, many_cycles):
             patch.setattr(module, "N_DRAWN", 100_000)
         patch.setattr(assumptions, "N_CLOCKS", 1)
-        for module in ("claim", "claims.identities", "claims.misprints", "claims.assumptions"):
+        for module in ("claim", "claims.misprints", "claims.assumptions"):
             name = f"conformance.audit.{module}.DIGITS"
             patch.setattr(name, adiabatic_particles.DIGITS)  # what is predicted is shared
         yield

@@ -21,7 +21,7 @@ from support.truth import proved_step
 
 import fast
 from conformance import suite
-from conformance.bench import baselines, growth, record, scoreboard, solvers, workloads
+from conformance.bench import baselines, record, scoreboard, solvers, workloads
 from conformance.bench.scoreboard import Graded, page, reasons
 from conformance.bench.solvers import Solver, SolverRun, by_call
 from conformance.cases import scenes
@@ -173,7 +173,7 @@ def test_a_solver_that_cannot_be_timed_is_left_out(drawn, why):
 @pytest.mark.deep
 def test_errors_grow_as_the_jacobians_say():
     followers = ours.our_followers()
-    grown = growth.grow(followers, proved_step, ours.prove_path, 3, 2, 24, lambda _: None)
+    grown = solvers.grow(followers, proved_step, ours.prove_path, 3, 2, 24, lambda _: None)
     assert 0.05 < grown.rate < 1.0
     rough, fine = grown.followers["compensated (fast)"], grown.followers["double-double (fast)"]
     assert rough[-1] > 100 * rough[0]
@@ -189,7 +189,7 @@ def test_a_wrong_wall_leaves_no_digit():
         path, _ = ours.prove_path(scene, state, n)
         return [*path[:3], path[3]._replace(wall="nowhere"), *path[4:]]
 
-    grown = growth.grow({"astray": astray}, proved_step, ours.prove_path, 3, 1, 6, lambda _: None)
+    grown = solvers.grow({"astray": astray}, proved_step, ours.prove_path, 3, 1, 6, lambda _: None)
     assert grown.lasts == {"astray": 3.0}
     assert grown.followers["astray"][3:] == (1.0, 1.0, 1.0)
 

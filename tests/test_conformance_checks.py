@@ -13,7 +13,7 @@ import reference
 from conformance.mutants import COMMON, MUTANTS, PLAIN
 from conformance.suite import checks
 from conformance.suite import run as suite
-from conformance.suite.checks import ensembles, refusals, timing
+from conformance.suite.checks import ensembles, requests, timing
 from conformance.suite.checks.flows import MAX_STATES
 from conformance.suite.checks.form import Draw, octaves, run_check
 from conformance.suite.session import Session
@@ -132,7 +132,7 @@ def test_questions_are_a_strategy_too():
 
 def test_bad_states_are_bad_and_good_ones_good_by_the_reference(tally):
     """What a check asks must be so: the proving stepper says the same, and leaves nothing open."""
-    for scene, request, why in refusals.bad_states(Draw("1"), "step"):
+    for scene, request, why in requests.bad_states(Draw("1"), "step"):
         start = State(**request["state"])
         outcome = reference.next_collision(scene, start, request["t_end"])
         assert isinstance(outcome, Rejected) == bool(why), (scene, request, why, outcome)
@@ -141,7 +141,7 @@ def test_bad_states_are_bad_and_good_ones_good_by_the_reference(tally):
 
 
 def test_bad_scenes_are_bad_and_good_ones_good_by_proof(tally):
-    for data, _, why in refusals.bad_scenes(Draw("1"), "step"):
+    for data, _, why in requests.bad_scenes(Draw("1"), "step"):
         with pytest.raises(BadInput) if why else nullcontext():
             from_data(data)
         tally["bad" if why else "good"] += 1

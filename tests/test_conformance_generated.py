@@ -25,7 +25,6 @@ from support.truth import certified_answer
 import fast
 from conformance import plain, suite, vectors
 from conformance.cases.draw import Draw, Question
-from conformance.cases.flow_families import any_marks
 from conformance.cases.generated import (
     ROUND,
     _is_steady,
@@ -36,16 +35,13 @@ from conformance.cases.generated import (
 )
 from conformance.cases.scenes import many_legs, walls_speed
 from conformance.cases.table import FAMILIES
-from conformance.grading.agreement import middle
-from conformance.grading.grade import SHARP, grade
+from conformance.grading.agreement import SHARP, grade, middle
 from conformance.mutants import MUTANTS, Mutant
 from conformance.mutants.laws import single
 from conformance.mutants.mutant import make_mutant
 from conformance.mutants.roots import TieBlind
 from conformance.mutants.walls import UPRIGHT
-from conformance.plain.flow import MAX_COLLISIONS, PlainPath
-from conformance.plain.motion import BangBangMotion, ConstantMotion
-from conformance.plain.step import Flight
+from conformance.plain.step import MAX_COLLISIONS, BangBangMotion, ConstantMotion, Flight, PlainPath
 from conformance.suite.checks import checks_of
 from conformance.suite.symmetry import Transform, draw_transform
 from conformance.verify import Verdict, verify_line
@@ -334,7 +330,7 @@ def test_what_the_verifier_does_not_prove_is_not_asked(monkeypatch):
 def test_a_flow_whose_capture_hangs_by_a_thread_is_not_asked(x, is_asked):
     """The walls that are met are the same on both sides of it."""
     still = Mushroom(r=1.0, w=0.5, h=1.0)
-    question = Question(still, State(0.0, x, 0.25, 0.0, 4.0), 0.25, 2, any_marks)
+    question = Question(still, State(0.0, x, 0.25, 0.0, 4.0), 0.25, 2, True)
     assert _is_steady(still, question) == is_asked
 
 

@@ -18,8 +18,7 @@ import fast
 import reference
 from conformance import plain
 from conformance.cases.attacks import stepped
-from conformance.grading.agreement import Enclosed, compare, middle, physics_bound
-from conformance.grading.grade import grade, precision_class
+from conformance.grading.agreement import Enclosed, compare, grade, middle, physics_bound, precision_class
 from conformance.mutants import PLAIN
 from conformance.mutants.mutant import make_mutant
 from conformance.strategies import scenes_and_states

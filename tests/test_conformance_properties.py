@@ -16,10 +16,15 @@ from support.depth import deep_but
 import fast
 import reference
 from conformance import plain, profiles
-from conformance.grading.called import is_clearly_inside
 from conformance.mutants import COMMON, MUTANTS
 from conformance.profiles import check_work_identity
-from conformance.properties import PROPERTIES, check_mirror, check_period_shift, check_scaling
+from conformance.properties import (
+    PROPERTIES,
+    check_mirror,
+    check_period_shift,
+    check_scaling,
+    is_clearly_inside,
+)
 from conformance.strategies import scenes_and_states
 from scene import (
     Cap,

@@ -30,7 +30,7 @@ import fast
 import fast.__main__ as fast_server
 import reference.__main__ as reference_server
 from conformance import plain, vectors
-from conformance.grading.grade import grade
+from conformance.grading.agreement import grade
 from conformance.harness import kit
 from conformance.harness.examples import Example, find_examples, find_kit_examples
 from conformance.suite import answers, reports

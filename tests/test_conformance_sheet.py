@@ -15,7 +15,6 @@ from conformance import plain, vectors
 from conformance.harness.examples import FOLDER, compiled, find_examples
 from conformance.suite import run as suite
 from conformance.suite import sheet as sheets
-from conformance.suite import sheet_files as files
 from conformance.suite.checks import ensembles
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
@@ -96,7 +95,7 @@ def off_by(part):
 def graded(sheet, tmp_path, content: bytes, name: str = "answers.jsonl"):
     path = tmp_path / name
     path.write_bytes(content)
-    return sheets.grade_answers(sheet, files.read_answers(path))
+    return sheets.grade_answers(sheet, sheets.read_answers(path))
 
 
 def test_what_comes_back_has_the_verdict_of_a_dialogue(sheet, tmp_path, tally):
@@ -125,7 +124,7 @@ def test_the_example_in_fortran_is_accepted_for_caps(sheet, tmp_path):
     if built.is_absent:
         pytest.skip(built.why_not)
     assert built.command, built.why_not
-    files.write_tables(sheet, tmp_path)
+    sheets.write_tables(sheet, tmp_path)
     done = subprocess.run(built.command, cwd=tmp_path, capture_output=True, check=True)
     run = graded(sheet, tmp_path, done.stdout, "answers.csv")
     assert run.objections() == []
@@ -153,7 +152,7 @@ def test_a_replayer_of_another_seed_is_refused(sheet, tmp_path):
     first = next(iter(sheet.questions.values()))
     with pytest.raises(BadInput, match=f"{first.case} has seq {first.seq}: they are answers to other"):
         graded(sheet, tmp_path, answers)
-    assert sheets.signed(files.read_answers(tmp_path / "answers.jsonl").echoes) == ("core", SEED + 1)
+    assert sheets.signed(sheets.read_answers(tmp_path / "answers.jsonl").echoes) == ("core", SEED + 1)
 
 
 @pytest.mark.parametrize("form", ["decimal", "hexadecimal", "fortran"])
@@ -161,7 +160,7 @@ def test_csv_answers_are_graded_alike(sheet, tmp_path, form):
     spell = {"decimal": repr, "hexadecimal": float.hex, "fortran": lambda x: f"{x:.17E}".replace("E", "D")}[
         form
     ]
-    names, table = [*files.NEEDED, *files.OPTIONAL], io.StringIO()
+    names, table = [*sheets.NEEDED, *sheets.OPTIONAL], io.StringIO()
     writer = csv.DictWriter(table, names, extrasaction="ignore")
     writer.writeheader()
     for line in answered(b"\n".join(sheet.lines())).splitlines():
@@ -176,8 +175,8 @@ def test_csv_answers_are_graded_alike(sheet, tmp_path, form):
 
 
 def test_csv_questions_hold_what_the_lines_hold(sheet, tmp_path):
-    n = files.write_tables(sheet, tmp_path)
-    names = (tmp_path / files.INDEX).read_text().split()
+    n = sheets.write_tables(sheet, tmp_path)
+    names = (tmp_path / sheets.INDEX).read_text().split()
     rows = {}
     for name in names:
         scene, *table = (tmp_path / name).read_text().split("seq,")
@@ -185,7 +184,7 @@ def test_csv_questions_hold_what_the_lines_hold(sheet, tmp_path):
         rows |= {line.split(",")[0]: line for line in table[0].splitlines()[1:]}
     assert n == len(sheet.questions) - 1
     assert set(rows) == {str(q.seq) for q in sheet.questions.values() if q.case != sheets.REJECTS}
-    assert files.read_key(tmp_path).questions.keys() == sheet.questions.keys()
+    assert sheets.read_key(tmp_path).questions.keys() == sheet.questions.keys()
 
 
 LINE = '{"seq":%d,"outcome":"undecided","reason":"x"}\n'
@@ -193,7 +192,7 @@ HEADER = "seq,outcome,t,x,y,vx,vy\n"
 ROW = "1,collision,1,0,0,1,1\n"
 BAD_ANSWERS = {
     "empty": ("a.jsonl", "", "holds no answer"),
-    "no json": ("a.jsonl", "yes\n", "a.jsonl':1: no JSON, and no seq: yes"),
+    "no json": ("a.jsonl", "yes\n", "a.jsonl':1: has no seq, must have that of its question: yes"),
     "no seq": ("a.jsonl", "{}\n", "has no seq"),
     "a list": ("a.jsonl", "[1]\n", "has no seq"),
     "twice": ("a.jsonl", LINE % 7 + LINE % 7, "a.jsonl':2: seq = 7 is answered twice, first at 1"),

@@ -19,7 +19,7 @@ from conformance.cases.table import FAMILIES
 from conformance.mutants import MUTANTS
 from conformance.suite.checks.flows import MAX_STATES
 from conformance.suite.checks.paths import MAX_HITS, MAX_WAIT
-from conformance.suite.checks.refusals import MOST_SAMPLES
+from conformance.suite.checks.requests import MOST_SAMPLES
 from fast.kernel.follow import LANE_ROWS
 from fast.validation import MAX_CYCLES, MOST_IN_CYCLES, MOST_TO_A_TIME
 from mushrooms.orbits import MAX_COLLISIONS, MAX_ORBITS

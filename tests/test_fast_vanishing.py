@@ -16,8 +16,8 @@ from support.from_python import from_python
 import fast
 import reference
 from conformance.cases.attacks import UnderAttack, run, stepped
+from conformance.cases.certify import proved_step
 from conformance.cases.delicate_families import sunk
-from conformance.cases.prover import proved_step
 from conformance.cases.table import FAMILIES
 from fast.batch import lane_steps
 from fast.kernel.lane_laws import law_at

@@ -65,7 +65,7 @@ FORBIDDEN = {
     "scene/laws.py": "from reference import above",
     "scene/tables.py": "import mushrooms",
     "conformance/claims.py": "import fast",
-    "conformance/grading/grade.py": "import reference",
+    "conformance/grading/agreement.py": "import reference",
     "conformance/grading/page.py": "import mushrooms",
     "conformance/verify.py": "from conformance import right",
     "conformance/auditors/claims.py": "from reference.above import proof",

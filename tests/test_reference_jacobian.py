@@ -16,7 +16,7 @@ from support.truth import centre, proved_step
 
 import fast
 import reference.path
-from conformance.cases.prover import ask, condition_number, ends, flight_of, inputs_of, moved
+from conformance.cases.certify import ask, condition_number, ends, flight_of, inputs_of, moved
 from conformance.grading.agreement import compare, exact
 from conformance.strategies import scenes_and_states
 from conformance.vectors import NUMBERS, Expectation, certified

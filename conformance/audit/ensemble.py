@@ -3,7 +3,11 @@
 Each figure is a `Check`, as in the audit: theory at that energy with what it leaves out, the departure that a
 sample of this size would show, and the power against a rival. A scene without frozen rates has the adiabatic
 theory only; then a band is granted that no rates confirm, (walls' speed / particles' speed)^(2/3), the order
-of the first correction. What is likely wrong is in `conformance.audit.causes`.
+of the first correction.
+
+Where a check fails, rivals tell what is likely wrong: each is a mistake that people make, known by what it
+does to log E1/E0 or to the capture intervals. One is named when the whole distribution is within chance of
+its own, and no more than a third as far off as theory's.
 
 Not handled: starts of several energies, tables other than mushrooms.
 """
@@ -11,15 +15,18 @@ Not handled: starts of several energies, tables other than mushrooms.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 from mpmath import fp
+from scipy.special import ndtr
+from scipy.stats import ks_1samp
 
 import theory
 from conformance.audit.claim import Check
-from conformance.audit.claims.broadened import DRAWN_SEED, PEAK_DENSITY, SKEWED, WIDENED, Sums
+from conformance.audit.claims.broadened import DRAWN_SEED, PEAK_DENSITY, Sums, peak_band
 from conformance.audit.runs import MAX_LOST, BoolArray, FloatArray
 from conformance.audit.tolerances import (
     N_SIGMA,
@@ -35,7 +42,9 @@ from conformance.audit.tolerances import (
 from scene import Mushroom
 from scene.geometry import half_width, table_at
 from scene.laws import bounds, values
-from scene.tables import laws
+from scene.refusal import BadInput
+from scene.transforms import backwards
+from theory.finite_energy.one_cycle import TheoryError
 
 IDENTITY = "mean of E0/E1, which is 1 in the limit"
 SHARE, PEAK = "p_nc: share never captured", "log E_nc: mean of log E1/E0 of the never captured"
@@ -48,6 +57,14 @@ N_TIMES = 4096  # of a cycle, at which laws are looked at
 FEW = 20  # particles below which a group says nothing
 N_LEVELS = 50  # of s, at which two directions are compared
 WAITS = 4  # longest flights between two arc hits, which captures and releases are told late by, and lags
+N_LOOKED_AT = 20_000  # particles
+NEARER = 1 / 3  # of theory's distance, that a rival may have
+CLOSE = 0.02  # distance that no chance explains, but that a rival's own error may
+EDGE = 0.02  # of a cycle
+BOUNCE = (
+    "phase volume is not kept, and the never captured have wrong energies too: the bounce is not"
+    " v - 2 (v.n - u) n, with the wall's speed u taken once, or with the wrong sign"
+)
 
 
 class GivenEnsemble(NamedTuple):
@@ -58,7 +75,7 @@ class GivenEnsemble(NamedTuple):
         energy: of every start, v^2 / 2 in the scene's units.
         s: (n,) log E1 / E0.
         captured: (n,) which were captured; None where nothing tells.
-        t_in, t_out: (n,) begin and end of a stay in the scene's time; nan for none; None where not given.
+        t_in, t_out: (n,) ends of the capture interval [scene's time]; nan for none; None where not given.
         x0, y0: (n,) where each started; None where not given.
         n_lost: rows without an energy, or particles without a row.
         is_binary32: whether every energy is a number of 24 bits.
@@ -78,81 +95,52 @@ class GivenEnsemble(NamedTuple):
     later: FloatArray | None = None
 
 
-class Expected(NamedTuple):
-    """What theory has for a scene at an energy.
+class HighEnergies:
+    """The limit of high energies, by the names of `theory.FiniteEnergy`; what it leaves out is a guess."""
 
-    Attributes:
-        mean_s, p_nc, peak, sigma: means, share, place and width of the peak; a width of 0 is not known.
-        mean_exp_minus: mean of E0/E1.
-        cdf, free_cdf, captured_cdf, capture_cdf: distributions of s and of the time of capture.
-        bands: what is left out of mean_s, p_nc, peak, sigma, captured, cdf.
-        has_rates: whether finite energy is in them.
-    """
+    def __init__(self, scene: Mushroom, energy: float) -> None:
+        found, self._curve = theory.predict(scene, 12), theory.energies(scene)
+        self.mean_s, self.p_nc, self.peak = float(found.m1), float(found.p_nc), (float(found.log_e_nc), 0.0)
+        self.cdf = self._curve.cdf
+        left_out = (walls_speed(scene) / math.sqrt(2 * energy)) ** (2 / 3)
+        self.theory_error = TheoryError(left_out, left_out, left_out, left_out, 0.0, 0.0)
+        self._edges = np.linspace(0.0, scene.period, N_TIMES + 1) + cycle_start(scene)
+        mass = theory.capture_time_mass(scene, self._edges) if self.p_nc < 1 else np.zeros(N_TIMES)
+        self._captured = np.cumsum(mass)
 
-    mean_s: float
-    p_nc: float
-    peak: float
-    sigma: float
-    mean_exp_minus: float
-    cdf: Cdf
-    free_cdf: Cdf
-    captured_cdf: Cdf
-    capture_cdf: Cdf
-    bands: dict[str, float]
-    has_rates: bool
+    def mean_of_exp(self, q: float) -> float:
+        """Return the mean of exp(-s)."""
+        return 1.0
+
+    def free_cdf(self, s: FloatArray) -> FloatArray:
+        """Return the distribution of s of the particles never captured: all at one place."""
+        return np.asarray(s >= self.peak[0], dtype=np.float64)
+
+    def captured_cdf(self, s: FloatArray) -> FloatArray:
+        """Return the distribution of s of the captured."""
+        return np.asarray(self._curve.captured_below(np.asarray(s)) / max(1 - self.p_nc, 1e-12))
+
+    def capture_cdf(self, t: FloatArray) -> FloatArray:
+        """Return the distribution of the time of capture."""
+        return np.asarray(np.interp(t, self._edges[1:], self._captured / max(self._captured[-1], 1e-12)))
 
 
-def expected(scene: Mushroom, energy: float) -> Expected:
+Theory = theory.FiniteEnergy | HighEnergies
+
+
+def expected(scene: Mushroom, energy: float) -> Theory:
     """Return what theory has for a scene at an energy: with rates where they are known."""
     try:
-        found = theory.at_energy(scene, energy)
+        return theory.at_energy(scene, energy)
     except theory.NotCovered:
-        return _adiabatic(scene, energy)
-    left, sigma = found.theory_error, found.peak[1] ** 0.5
-    shape = WIDENED * left.variance + SKEWED * left.skewness
-    bands = {
-        "mean_s": left.mean_s,
-        "p_nc": left.p_nc,
-        "peak": left.peak_mean,
-        "sigma": sigma * left.variance / 2,
-        "captured": left.captured_mean,
-        "cdf": PEAK_DENSITY * left.peak_mean / sigma + shape,
-    }
-    return Expected(
-        mean_s=found.mean_s,
-        p_nc=found.p_nc,
-        peak=found.peak[0],
-        sigma=sigma,
-        mean_exp_minus=found.mean_of_exp(-1),
-        cdf=found.cdf,
-        free_cdf=found.free_cdf,
-        captured_cdf=found.captured_cdf,
-        capture_cdf=found.capture_cdf,
-        bands={name: float(band) for name, band in bands.items()},
-        has_rates=True,
-    )
+        return HighEnergies(scene, energy)
 
 
-def _adiabatic(scene: Mushroom, energy: float) -> Expected:
-    found, curve = theory.predict(scene, 12), theory.energies(scene)
-    p_nc, peak = float(found.p_nc), float(found.log_e_nc)
-    band = (walls_speed(scene) / math.sqrt(2 * energy)) ** (2 / 3)
-    span = scene.period
-    edges = np.linspace(0.0, span, N_TIMES + 1) + cycle_start(scene)
-    mass = np.cumsum(theory.capture_time_mass(scene, edges)) if p_nc < 1 else np.zeros(N_TIMES)
-
-    def free_cdf(s: FloatArray) -> FloatArray:
-        return np.asarray(s >= peak, dtype=np.float64)
-
-    def captured_cdf(s: FloatArray) -> FloatArray:
-        return np.asarray(curve.captured_below(np.asarray(s)) / max(1 - p_nc, 1e-12))
-
-    def capture_cdf(t: FloatArray) -> FloatArray:
-        return np.asarray(np.interp(t, edges[1:], mass / max(mass[-1], 1e-12)))
-
-    bands = dict.fromkeys(("mean_s", "p_nc", "peak", "sigma", "captured", "cdf"), band)
-    figures = float(found.m1), p_nc, peak, 0.0, 1.0
-    return Expected(*figures, curve.cdf, free_cdf, captured_cdf, capture_cdf, bands, False)
+def shape_band(theirs: Theory) -> float:
+    """Return how far the distribution function of s may be off."""
+    if isinstance(theirs, HighEnergies):
+        return theirs.theory_error.peak_mean
+    return peak_band(theirs)
 
 
 def cycle_start(scene: Mushroom) -> float:
@@ -162,10 +150,8 @@ def cycle_start(scene: Mushroom) -> float:
 
 def walls_speed(scene: Mushroom) -> float:
     """Return the largest rate of a size over a cycle [length / time]."""
-    times = np.linspace(0.0, scene.period, N_TIMES + 1)
-    sizes = [values(law, times) for name, law in laws(scene).items() if name not in ("nu", "slope")]
-    sizes.append(half_width(fp, scene, times))
-    return float(max(np.max(np.abs(np.diff(size))) for size in sizes) * N_TIMES / scene.period)
+    now = table_at(fp, scene, np.linspace(0.0, scene.period, N_TIMES + 1))
+    return max(float(np.max(np.abs(rate))) for rate in (now.r_rate, now.w_rate, now.h_rate))
 
 
 def nu_at(scene: Mushroom, times: FloatArray) -> FloatArray:
@@ -173,19 +159,19 @@ def nu_at(scene: Mushroom, times: FloatArray) -> FloatArray:
     return np.asarray(half_width(fp, scene, times) / values(scene.r, times))
 
 
-def checks(given: GivenEnsemble, theirs: Expected) -> list[Check]:
+def checks(given: GivenEnsemble, theirs: Theory) -> list[Check]:
     """Return every figure of the paper that the ensemble can be held to."""
     return [
         *_records(given),
         *_starts(given),
         *_energies(given, theirs),
         *_captures(given, theirs),
-        *_stays(given, theirs),
+        *_capture_intervals(given, theirs),
         *_later(given, theirs),
     ]
 
 
-def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Expected) -> Check:
+def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Theory) -> Check:
     """Hold two directions of one cycle to p_rev(-s) = p(s) exp(-s): to the share below s, at its worst."""
     here, there = _some(given.s), -_some(other.s)
     places = np.quantile(np.concatenate([here, there]), np.linspace(0.01, 0.99, N_LEVELS))
@@ -195,7 +181,7 @@ def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Expected) -> Ch
         "reversal identity: share of exp(-s) below s, less that above -s of the reversed cycle",
         max(found, key=lambda pair: abs(pair[0]) / pair[1]),
         0.0,
-        band=2 * theirs.bands["cdf"],
+        band=2 * shape_band(theirs),
         scale=0.3,
         against=("the same direction twice", 0.3),
     )
@@ -229,48 +215,50 @@ def _starts(given: GivenEnsemble) -> Iterator[Check]:
         yield close(OUTWARD, mean(out), 0.5, scale=0.3, against=("all on the arc", 1.0))
 
 
-def _energies(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
-    s, bands = given.s, theirs.bands
+def _energies(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
+    s, left = given.s, theirs.theory_error
     rival = ("no growth", 0.0) if theirs.mean_s else None
-    scale = max(abs(theirs.mean_s), bands["mean_s"]) * 4
-    yield close(
-        "m1: mean of log E1/E0", mean(s), theirs.mean_s, band=bands["mean_s"], scale=scale, against=rival
-    )
+    scale = max(abs(theirs.mean_s), left.mean_s) * 4
+    yield close("m1: mean of log E1/E0", mean(s), theirs.mean_s, band=left.mean_s, scale=scale, against=rival)
     yield close(
         IDENTITY,
         mean(np.exp(-s)),
-        theirs.mean_exp_minus,
-        band=bands["mean_s"],
+        theirs.mean_of_exp(-1),
+        band=left.mean_s,
         scale=0.5,
     )
-    if theirs.has_rates:
+    if isinstance(theirs, theory.FiniteEnergy):
         mirrored = ("the wrong sign of every gain", lambda x: 1 - theirs.cdf(-np.asarray(x)))
-        yield fits("log E1/E0", _some(s), theirs.cdf, band=bands["cdf"], scale=0.3, against=mirrored)
+        yield fits("log E1/E0", _some(s), theirs.cdf, band=peak_band(theirs), scale=0.3, against=mirrored)
 
 
-def _captures(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
+def _captures(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     if given.captured is None:
         return
-    free, caught, bands = given.s[~given.captured], given.s[given.captured], theirs.bands
+    free, caught, left = given.s[~given.captured], given.s[given.captured], theirs.theory_error
     yield close(
         SHARE,
         share(~given.captured),
         theirs.p_nc,
-        band=bands["p_nc"],
+        band=left.p_nc,
         scale=0.3,
         against=("nobody is captured", 1.0) if theirs.p_nc < 1 else None,
     )
     if len(free) >= FEW:
-        yield close(PEAK, mean(free), theirs.peak, band=bands["peak"])
-    if len(free) >= FEW and theirs.has_rates:
-        yield close("width of their peak", spread(free), theirs.sigma, band=bands["sigma"])
-        yield fits(FREE, _some(free), theirs.free_cdf, band=bands["cdf"], scale=0.4)
-    if len(caught) >= FEW and theirs.p_nc < 1 and theirs.has_rates:
-        band = bands["cdf"] + bands["captured"] * _steepest(caught, theirs.captured_cdf)
+        yield close(PEAK, mean(free), theirs.peak[0], band=left.peak_mean)
+    if isinstance(theirs, HighEnergies):
+        return
+    band = peak_band(theirs)
+    if len(free) >= FEW:
+        sigma = theirs.peak[1] ** 0.5
+        yield close("width of their peak", spread(free), sigma, band=sigma * left.variance / 2)
+        yield fits(FREE, _some(free), theirs.free_cdf, band=band, scale=0.4)
+    if len(caught) >= FEW and theirs.p_nc < 1:
+        band += left.captured_mean * _steepest(caught, theirs.captured_cdf)
         yield fits(CAPTURED, _some(caught), theirs.captured_cdf, band=band, scale=0.4)
 
 
-def _stays(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
+def _capture_intervals(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     if given.t_in is None or theirs.p_nc == 1:
         return
     t_in = given.t_in[np.isfinite(given.t_in)]
@@ -279,7 +267,7 @@ def _stays(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
     wait = 2 * float(bounds(given.scene.r).highest) / math.sqrt(2 * given.energy)
     grid = np.linspace(t_in.min(), t_in.max(), 2000)
     seen = float(np.max(theirs.capture_cdf(grid) - theirs.capture_cdf(grid - wait)))
-    band = seen + theirs.bands["captured"]
+    band = seen + theirs.theory_error.captured_mean
     yield fits(TIMES, _some(t_in), theirs.capture_cdf, band=band, scale=0.4)
     if given.t_out is None:
         return
@@ -295,16 +283,15 @@ def _stays(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
     )
 
 
-def _later(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
+def _later(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     """Hold log E_k/E0 after each further cycle to sums of k cycles, drawn from theory where it has rates."""
     if given.later is None:
         return
     n_cycles = 1 + given.later.shape[1]
     n_drawn = MOST_DRAWN // n_cycles
-    found = theory.at_energy(given.scene, given.energy) if theirs.has_rates else None
-    drawn = None if found is None else found.draw(n_cycles, n_drawn, DRAWN_SEED)
+    drawn = None if isinstance(theirs, HighEnergies) else theirs.draw(n_cycles, n_drawn, DRAWN_SEED)
     for k, total in enumerate(given.later.T, 2):
-        what, band = f"log E{k}/E0", k * theirs.bands["mean_s"]
+        what, band = f"log E{k}/E0", k * theirs.theory_error.mean_s
         if drawn is None:
             yield close(f"mean of {what}", mean(total), k * theirs.mean_s, band=band)
             continue
@@ -316,11 +303,132 @@ def _later(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
         yield fits(what, _some(total), sums.cdf, band=shape, scale=0.3)
 
 
-def _some(values: FloatArray) -> FloatArray:
-    return values[:: 1 + (len(values) - 1) // MOST_SORTED]
+def _some(values: FloatArray, most: int = MOST_SORTED) -> FloatArray:
+    return values[:: 1 + (len(values) - 1) // most]
 
 
 def _steepest(values: FloatArray, cdf: Cdf) -> float:
     lowest, highest = np.quantile(values, (0.001, 0.999)).tolist()
     places = np.linspace(lowest, highest, 400)
     return float(np.max(np.diff(cdf(places)) / np.diff(places)))
+
+
+class Rival(NamedTuple):
+    """A mistake: what is said of it, what undoes it in s, and the distribution that is then left."""
+
+    said: str
+    cdf: Cdf
+    undo: Callable[[FloatArray], FloatArray] = np.asarray
+
+
+def likely_causes(given: GivenEnsemble, theirs: Theory, found: list[Check]) -> list[str]:
+    """Say what is likely wrong, a line each; nothing where every check holds or nothing known fits."""
+    wrong = {check.what for check in found if check.holds is False}
+    if not wrong:
+        return []
+    records = list(_told_by_records(given, theirs))
+    if (end := _common_end(given)) is not None:
+        return [*records, f"many captures end together at {end:.3f} of the cycle: it was followed no further"]
+    told = [*records, *_told_by_captures(given, theirs, wrong)]
+    s = _some(given.s, N_LOOKED_AT)
+    distance, reach = gap(s, theirs.cdf), critical_gap(len(s)) + shape_band(theirs)
+    if distance <= reach:
+        return told
+    fitting = []
+    for rival in _rivals(given, theirs, wrong.isdisjoint((TIMES, CAPTURED, FREE))):
+        with np.errstate(all="ignore"):
+            undone = rival.undo(s)
+        left = gap(undone, rival.cdf) if np.isfinite(undone).all() else math.inf
+        if left <= min(max(reach, CLOSE), NEARER * distance):
+            fitting.append((left, rival.said))
+    if not fitting and wrong.issuperset((IDENTITY, PEAK, FREE)):
+        return [*records, BOUNCE]
+    return [*told, *(said for _, said in sorted(fitting)[:2])]
+
+
+def gap(values: FloatArray, cdf: Cdf) -> float:
+    """Return Kolmogorov's distance of a sample from a distribution."""
+    return float(ks_1samp(values, cdf, method="asymp").statistic)
+
+
+def _told_by_records(given: GivenEnsemble, theirs: Theory) -> Iterator[str]:
+    n = len(given.s) + given.n_lost
+    if given.is_binary32:
+        yield "energies were written or computed in single precision (binary32): 7 digits"
+    if given.n_lost > MAX_LOST * n:
+        lost = given.n_lost / n
+        yield f"{lost:.1%} of the particles are missing: no figure is judged without them"
+        if given.captured is not None and abs(lost - (1 - theirs.p_nc)) < 3 * (0.25 / n) ** 0.5 + 0.01:
+            share = f"{1 - theirs.p_nc:.1%}"
+            yield f"as many are missing as theory has captured, {share}: captured ones were dropped"
+    if given.captured is not None and not given.captured.any() and theirs.p_nc < 1:
+        yield "nobody is captured: captured particles were dropped, or captures were not looked for"
+
+
+def _common_end(given: GivenEnsemble) -> float | None:
+    """Return the part of the cycle after which no capture interval goes on, if many last until then."""
+    if given.t_out is None or not np.isfinite(given.t_out).any():
+        return None
+    ends = (given.t_out - cycle_start(given.scene)) / given.scene.period
+    last = float(np.nanmax(ends))
+    return last if last < 1 - 4 * EDGE and float(np.mean(ends > last - EDGE)) > EDGE else None
+
+
+def _told_by_captures(given: GivenEnsemble, theirs: Theory, wrong: set[str]) -> Iterator[str]:
+    if not wrong.isdisjoint((STARTS, OUTWARD)):
+        yield "starts are not uniform in area: on a wall only, or in one part of the table"
+    if given.t_in is None or given.t_out is None or not np.isfinite(given.t_in).any():
+        return
+    if RELEASE in wrong:
+        drop = np.nanmean(nu_at(given.scene, given.t_out) - nu_at(given.scene, given.t_in))
+        how = "before" if drop < 0 else "after"
+        yield (
+            f"captured particles are let out {how} the mouth is as wide as when they were caught (nu by"
+            f" {abs(drop):.3f}): the mouth's edge leaks, or base and arc do not keep the angle"
+        )
+    elif SHARE in wrong:
+        share = float(np.mean(np.isfinite(given.t_in)))
+        few, more = "few" if share < 1 - theirs.p_nc else "many", "; or starts are not uniform"
+        yield (
+            f"too {few} are captured, {share:.1%} for {1 - theirs.p_nc:.1%}: the mouth is not as wide as its"
+            f" law says, as where its corners leak{more if wrong.isdisjoint((TIMES, CAPTURED)) else ''}"
+        )
+
+
+def _rivals(given: GivenEnsemble, theirs: Theory, right_groups: bool) -> Iterator[Rival]:
+    undo: dict[str, Callable[[FloatArray], FloatArray]] = {
+        "s has the wrong sign: E0 and E1 are exchanged": np.negative,
+        "E1/E0 is given in place of its logarithm": np.log,
+        "E1/E0 - 1 is given in place of log E1/E0": np.log1p,
+        "speeds are given in place of energies: s is half of what it should be": lambda s: 2 * s,
+        "a logarithm to base 10 is given": lambda s: s * np.log(10),
+    }
+    yield from (Rival(said, theirs.cdf, undoing) for said, undoing in undo.items())
+    yield Rival("only the never captured are there: captured particles were dropped", theirs.free_cdf)
+    if theirs.p_nc < 1:
+        yield Rival("only the captured are there", theirs.captured_cdf)
+    if theirs.p_nc < 1 and (given.captured is None or (given.captured.any() and right_groups)):
+        p = _share_of_the_free(given, theirs)
+        yield Rival(
+            f"never captured {p:.1%}, where theory has {theirs.p_nc:.1%}, both with the right energies:"
+            " starts are not uniform in area and direction, or a share of one group is lost",
+            lambda s: p * theirs.free_cdf(s) + (1 - p) * theirs.captured_cdf(s),
+        )
+    variance = max(theirs.peak[1], 1e-18)
+    yield Rival(
+        "energies return: the loop encloses nothing, as with a law of the wrong frequency",
+        lambda s: np.asarray(ndtr((np.asarray(s) - variance / 4) / variance**0.5)),
+    )
+    with suppress(BadInput, theory.NotConverged):
+        turned = expected(backwards(given.scene), given.energy)
+        yield Rival("the cycle was run backwards, or with a and b exchanged", turned.cdf)
+
+
+def _share_of_the_free(given: GivenEnsemble, theirs: Theory) -> float:
+    """Return the share of the never captured: as told, or that which fits best."""
+    if given.captured is not None:
+        return float(np.mean(~given.captured))
+    s = _some(given.s, N_LOOKED_AT)
+    free, captured = theirs.free_cdf(np.sort(s)), theirs.captured_cdf(np.sort(s))
+    steps, apart = (np.arange(len(s)) + 0.5) / len(s) - captured, free - captured
+    return float(np.clip(steps @ apart / (apart @ apart), 0.0, 1.0))

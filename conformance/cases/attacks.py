@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import msgspec
 
-from conformance.cases.certify import claimed_path, judge
+from conformance.cases.certify import claimed_path, judge, proved_step
 from conformance.cases.draw import Family, Proved, Question, file_vector
-from conformance.cases.prover import proved_step
 from conformance.grading.agreement import compare
 from conformance.vectors import Expectation
 from scene import Outcome, Rejected, Scene, State, Undecided, from_data
@@ -123,10 +122,10 @@ def judged(attack: Question, steppers: UnderAttack) -> Iterable[Judgement]:
     if is_proved or found.kind == "wrong":
         yield found
     if step is not None:
-        is_alone, alone = attack.collisions is None, attack._replace(collisions=None, flow=None)
+        is_alone, alone = attack.collisions is None, attack._replace(collisions=None, is_flow=False)
         claim = (found if is_alone else _survived(partial(confirmed, alone))).claim
         yield _survived(lambda: stepped(step(*asked), claim, attack.state))
-    if flow is not None and attack.flow:
+    if flow is not None and attack.is_flow:
         yield _survived(lambda: flown(flow(*asked), found.claim))
 
 
@@ -153,7 +152,7 @@ def confirmed(attack: Question) -> Judgement:
         return Judgement("undecided", claim.reason, seconds=seconds)
     written = Expectation("collision", claim.steps) if is_undecided else claim
     proved = Proved((written,), collisions=max(n_steps, 1))
-    verdict = judge(file_vector(attack._replace(group="attack", flow=None), 1, proved, "stress"))
+    verdict = judge(file_vector(attack._replace(group="attack", is_flow=False), 1, proved, "stress"))
     if verdict.status == "false":
         return Judgement("wrong", f"the reference claims what is false: {verdict.reason}", seconds=seconds)
     if is_undecided:

@@ -1,5 +1,9 @@
 """From a question to a certified vector: the reference answers, and the verifier proves what is written.
 
+Answers of single steps come first, the one place that makes them from the reference's enclosures. At a knot
+of a law the acceleration of a wall jumps, and the derivatives with it. Rounding may put a hit on either side:
+the larger sum of both sides counts.
+
 Along a path the Jacobians of the steps are chained: what rounding every state that a stepper holds may do.
 
 An arc hit of a mushroom is captured when |x vy - y vx| > w(t) |v|, with the time and place of the hit and
@@ -14,34 +18,21 @@ these happen is enclosed with the path.
 import json
 from collections.abc import Sequence
 from fractions import Fraction
-from math import inf, isfinite
+from math import fsum, inf, isfinite
+from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
 import reference
-from conformance.cases.draw import Mark, Proved, Question, Unfit, file_vector
-from conformance.cases.prover import (
-    CONDITIONS,
-    NUDGES,
-    SIGNS,
-    Matrix,
-    ask,
-    coasted,
-    collided,
-    condition_number,
-    ends,
-    expectation,
-    flight_of,
-    free_flight,
-    inputs_of,
-    nudged,
-)
-from conformance.plain.flow import CaptureInterval
+from conformance.cases.draw import Proved, Question, Unfit, file_vector
+from conformance.plain.step import CaptureInterval
 from conformance.vectors import (
+    DIGITS,
     NUMBERS,
     Certified,
+    Ends,
     Expectation,
     Level,
     Vector,
@@ -49,7 +40,7 @@ from conformance.vectors import (
     four_digits,
 )
 from conformance.verify import Verdict, verify_line
-from reference.arithmetic import Arithmetic, Interval, sign
+from reference.arithmetic import Arithmetic, Interval, rational, sign
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import (
     BadInput,
@@ -60,9 +51,173 @@ from scene import (
     State,
     Undecided,
     Undefined,
+    Wall,
     from_data,
 )
 
+# What a level asks (docs/corpus.md): nudges that change no wall, and the largest condition number.
+NUDGES: tuple[tuple[Level, float], ...] = (("core", 2.0**-30), ("extended", 2.0**-44))
+CONDITIONS = {"core": 1e6, "extended": 1e12}
+# Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
+SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
+Matrix = list[list[float]]
+GUARD = 6  # decimals asked of the reference beyond those that are written down
+
+
+class ProvedFlight(NamedTuple):
+    """A flight up to a collision or the horizon, as the reference proved it.
+
+    Attributes:
+        wall: the wall met; None at the horizon.
+        ends: low and high of dt, x, y, vx, vy.
+        jacobian: (5, 5) derivatives of these, in this order, by t, x, y, vx, vy.
+    """
+
+    wall: Wall | None
+    ends: dict[str, Ends]
+    jacobian: Matrix
+
+    def centre(self) -> list[float]:
+        """Return dt, x, y, vx, vy, rounded."""
+        return [float(sum(self.ends[name]) / 2) for name in NUMBERS]
+
+    def allowance(self, state: State) -> list[float]:
+        """Return for dt, x, y, vx, vy the sum over inputs of |d out / d in| |in|."""
+        return [moved(row, inputs_of(state)) for row in self.jacobian]
+
+    def certified(self, state: State, digits: int = DIGITS) -> Certified:
+        """Write it down to so many decimals."""
+        return certified(self.ends, self.allowance(state), self.wall, digits=digits)
+
+
+def ask(scene: Scene, state: State, t_end: float, digits: int = DIGITS) -> reference.Outcome:
+    """Return the reference's outcome, close enough for so many decimals, with its Jacobian."""
+    return reference.next_collision(scene, state, t_end, digits=digits + GUARD, is_differentiated=True)
+
+
+def flight_of(outcome: reference.Collision | reference.Horizon, state: State, t_end: float) -> ProvedFlight:
+    """Return the flight that led to an outcome of `ask`."""
+    if isinstance(outcome, reference.Horizon):
+        dt = Fraction(t_end) - Fraction(state.t)
+        return ProvedFlight(None, _numbers((dt, dt), outcome.at), free_flight(state, float(dt)))
+    assert outcome.jacobian is not None
+    largest = max(abs(float(end)) for row in outcome.jacobian for d in row for end in d)
+    jacobian = [[_steepest(d, largest) for d in row] for row in outcome.jacobian]
+    return ProvedFlight(outcome.wall, collided(outcome), jacobian)
+
+
+def _steepest(derivative: reference.Enclosure, largest: float) -> float:
+    """Return a derivative rounded; at a knot, where it is enclosed between two, the greater in size."""
+    low, high = float(derivative.lo), float(derivative.hi)
+    if high - low <= 2.0**-40 * largest:
+        return float(derivative)
+    return max(low, high, key=abs)
+
+
+def expectation(
+    outcome: reference.Outcome, state: State, t_end: float, digits: int = DIGITS
+) -> Expectation | None:
+    """Return an outcome of `ask` as a certified answer; None where it is undecided."""
+    if isinstance(outcome, Undecided):
+        return None
+    if isinstance(outcome, Undefined):
+        return Expectation("undefined", reason=outcome.reason)
+    if isinstance(outcome, Rejected):
+        return Expectation("rejected")
+    flight = flight_of(outcome, state, t_end)
+    return Expectation("collision" if flight.wall else "horizon", (flight.certified(state, digits),))
+
+
+def proved_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS) -> Expectation | None:
+    """Answer a step by proof.
+
+    Args:
+        scene: table and laws.
+        state: the start.
+        t_end: horizon [time].
+        digits: decimals of the certified answer.
+
+    Returns:
+        The certified answer; None where the reference is undecided.
+    """
+    return expectation(ask(scene, state, t_end, digits), state, t_end, digits)
+
+
+def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> State:
+    """Return a state whose numbers are moved by a part of their sizes, each in a direction of its own.
+
+    Args:
+        state: the start.
+        t_end: horizon [time]; no later time is returned.
+        signs: of the moves of t, x, y, vx, vy.
+        nudge: relative; to the greater component for place and velocity.
+    """
+    place, speed = max(abs(state.x), abs(state.y)), max(abs(state.vx), abs(state.vy))
+    sizes = (abs(state.t), place, place, speed, speed)
+    values = [v + nudge * sign * size for v, sign, size in zip(inputs_of(state), signs, sizes, strict=True)]
+    t, x, y, vx, vy = values
+    return State(min(t, t_end), x, y, vx, vy, state.wall)
+
+
+def ends(enclosure: reference.Enclosure) -> Ends:
+    """Return both ends of one of the reference's enclosures, exactly."""
+    return rational(enclosure.lo._mpf_), rational(enclosure.hi._mpf_)
+
+
+def collided(outcome: reference.Collision) -> dict[str, Ends]:
+    """Return the ends of dt, x, y, vx, vy of a collision."""
+    return _numbers(ends(outcome.dt), outcome.after)
+
+
+def coasted(outcome: reference.Horizon, since: Ends) -> dict[str, Ends]:
+    """Return the ends of dt, x, y, vx, vy at the horizon, dt counted from an enclosed time."""
+    low, high = ends(outcome.at.t)
+    return _numbers((low - since[1], high - since[0]), outcome.at)
+
+
+def _numbers(dt: Ends, after: reference.Moment) -> dict[str, Ends]:
+    return {"dt": dt, **{name: ends(getattr(after, name)) for name in NUMBERS[1:]}}
+
+
+def inputs_of(state: State) -> list[float]:
+    """Return the five numbers that a step starts from: t, x, y, vx, vy."""
+    return [state.t, state.x, state.y, state.vx, state.vy]
+
+
+def moved(row: Sequence[float], inputs: Sequence[float]) -> float:
+    """Return the sum over inputs of |d out / d in| |in|, for the derivatives of one output."""
+    return fsum(abs(d * value) for d, value in zip(row, inputs, strict=True))
+
+
+def free_flight(state: State, dt: float) -> Matrix:
+    """Return the (5, 5) Jacobian of a flight up to a fixed time: dt, x, y, vx, vy by t, x, y, vx, vy."""
+    return [
+        [-1.0, 0.0, 0.0, 0.0, 0.0],
+        [-state.vx, 1.0, 0.0, dt, 0.0],
+        [-state.vy, 0.0, 1.0, 0.0, dt],
+        [0.0, 0.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 1.0],
+    ]
+
+
+def condition_number(out: Sequence[float], allowance: Sequence[float]) -> float:
+    """Return the largest relative change of an output per relative change of the inputs.
+
+    Args:
+        out: (dt, x, y, vx, vy), the exact answer rounded.
+        allowance: for each of these the sum over inputs of |d out / d in| |in|.
+
+    Returns:
+        max over outputs of (sum |d out / d in| |in|) / |out|, place and velocity taken as vectors'
+        largest components; inf when such a vector vanishes though it can move.
+    """
+    sizes = [abs(value) for value in out]
+    parts = [(max(allowance[part]), max(sizes[part])) for part in (slice(1), slice(1, 3), slice(3, 5))]
+    return max((change / size if size else (inf if change else 0.0)) for change, size in parts)
+
+
+# What a hit means for capture intervals: arc of a mushroom, captured or free; wall of the stem; nothing.
+Mark = Literal["captured", "free", "out", ""]
 WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
 
 
@@ -140,13 +295,13 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     state, t_end = question.state, question.t_end
     try:
         path = reference.trajectory(scene, state, question.collisions, t_end, working=working)
-        captured = marks(scene, path.steps) if question.flow else []
+        captured = marks(scene, path.steps) if question.is_flow else []
     except InvalidState as error:
         raise Unfit(str(error)) from None
     end = path.outcome
-    if question.flow and not (isinstance(end, reference.Horizon) and question.flow(captured)):
-        raise Unfit("not the flow that is looked for")
-    links = Links(scene, state, t_end, is_timed=question.flow is None)
+    if question.is_flow and not isinstance(end, reference.Horizon):
+        raise Unfit("no flow to the horizon")
+    links = Links(scene, state, t_end, is_timed=not question.is_flow)
     steps = _steps(links, path, question)
     if len(steps) < len(path.steps):
         end = None
@@ -157,7 +312,7 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
         raise Unfit("the reference is undecided")
     if any(map(_is_wide, steps)):
         return proved_path(scene, question, 2 * path.digits)
-    if question.flow:
+    if question.is_flow:
         arrived = arrival(steps, capture_intervals(captured))
         largest = max(links.condition, timing_condition(arrived, state))
         if largest > question.longest:
@@ -178,7 +333,7 @@ def _steps(links: Links, path: reference.Trajectory, question: Question) -> list
             break
         links.largest = max(links.largest, links.condition)
         steps.append(certified(collided(found), finite(allowance), found.wall, is_wide=True))
-    if len(steps) < (len(path.steps) if question.flow else 1):
+    if len(steps) < (len(path.steps) if question.is_flow else 1):
         raise Unfit("no collision is met, or the first is too delicate")
     return steps
 

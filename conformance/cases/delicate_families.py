@@ -26,7 +26,6 @@ SPEEDS = (-2.0, -1.0, -0.75, -0.1, 0.0, 0.1, 0.25, 1.0, 3.0)
 PERIOD = 4.0
 ARRIVALS = (0.5, 1.0, 2.0)  # flight times
 SIDES: tuple[Wall, ...] = ("left", "right")
-HARDLY = (0.0, 2.0**-52, -(2.0**-52), 2.0**-40, -(2.0**-40))  # off a floor
 LARGEST = 390  # powers of two, of units of length and time
 
 
@@ -193,18 +192,6 @@ def tiny_slope(draw: Draw) -> Question:
     return Question(draw.pick(tables), leaving, turn + draw.pick((3.0, at_or_next_to(draw, back))))
 
 
-def residual(draw: Draw) -> Question:
-    """Wait just beside an arc's top, or on a floor, that draws back and returns; to a corner at times."""
-    t = draw.pick((0.25, 0.5, 0.125, 0.75))
-    law, size = rise_and_fall(1.0, draw.pick((2.0, 1.5)), t)
-    off, vx = draw.pick((0.0, 1.0, -1.0)) * draw.power(-200, -20), draw.pick((0.0, 0.25, 0.5 / (2 - 2 * t)))
-    asked: tuple[tuple[Scene, State], ...] = (
-        (Cap(r=law), State(t, off, at_or_next_to(draw, size), 0.0, 0.0, "arc")),
-        (Stem(w=1.0, h=law), State(t, 0.5, draw.pick(HARDLY) - size, vx, 0.0, "floor")),
-    )
-    return Question(*draw.pick(asked), draw.pick((3.0, at_or_next_to(draw, 2 - t))))
-
-
 def on_the_wall(draw: Draw) -> Question:
     """Start off a wall that is named, by what is allowed or clearly, in a table next to nothing."""
     law = Fourier(mean=1.0, omega=1.0, cos=(1.0 - 10.0 ** -draw.between(1.0, 4.0),))
@@ -323,12 +310,6 @@ FAMILIES = (
         "tiny-slope",
         "f is asked for where f - f(0) decides, at the crossing or the horizon",
         tiny_slope,
-        is_delicate=True,
-    ),
-    Family(
-        "residual",
-        "f(0) of the arc or the floor is forgotten where it is met again",
-        residual,
         is_delicate=True,
     ),
     Family("on-the-wall", "a state is on its wall by the largest size of all time", on_the_wall),

@@ -9,7 +9,7 @@ function from a stream to a question: what is asked, and how it is filed once it
 import math
 import random
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 
@@ -17,8 +17,6 @@ from conformance.vectors import Expectation, Kind, Level, OutcomeName, Vector
 from scene import BadInput, Scene, State, Wall, from_data, to_data
 
 T = TypeVar("T")
-# What a hit means for capture intervals: arc of a mushroom, captured or free; wall of the stem; nothing.
-Mark = Literal["captured", "free", "out", ""]
 LONGEST = 1e8  # condition number up to which a trajectory is followed
 NEVER = 2.0**1000  # the horizon of paths that are asked for without one [time]
 ATTEMPTS = 4000  # draws for one question
@@ -118,7 +116,7 @@ class Question(NamedTuple):
         state: the start.
         t_end: horizon [time].
         collisions: None for a step; for a trajectory how many are tried, for a flow how many at most.
-        flow: None when it is none; else which of its collisions' marks (`paths.marks`) are looked for.
+        is_flow: whether it asks for a flow, whose path has all collisions up to t_end.
         longest: condition number up to which a trajectory or a flow is followed.
         also: outcomes that are right beside the proved one.
         level: None to measure it.
@@ -132,7 +130,7 @@ class Question(NamedTuple):
     state: State
     t_end: float
     collisions: int | None = None
-    flow: Callable[[Sequence[Mark]], bool] | None = None
+    is_flow: bool = False
     longest: float = LONGEST
     also: tuple[OutcomeName, ...] = ()
     level: Level | None = None
@@ -144,7 +142,7 @@ class Question(NamedTuple):
     @property
     def kind(self) -> Kind:
         """Return what is asked for."""
-        return "step" if self.collisions is None else "flow" if self.flow else "trajectory"
+        return "step" if self.collisions is None else "flow" if self.is_flow else "trajectory"
 
     def wire_scene(self) -> dict[str, Any]:
         """Return the scene in the wire's form."""
@@ -159,12 +157,8 @@ class Family(NamedTuple):
         aim: what it tests, or the mistake that it hunts.
         ask: from a stream of numbers to a question; it may raise Unfit or BadInput for another draw.
         source: place in the paper, or hard case.
-        n_vectors: how many are in the corpus.
         weight: how many are in each round of a run's questions.
         meets: the wall that such a question meets first; None for any.
-        wanted: the outcome of its vectors; None for any answer of a valid question.
-        first_attempts: for each vector which draw is tried first, 0 by default. What a family looks for may
-            be rare: the plain stepper has been asked before, so that few draws are certified in vain.
         is_delicate: built so that an honest stepper may often leave it undecided.
     """
 
@@ -172,11 +166,8 @@ class Family(NamedTuple):
     aim: str
     ask: Callable[[Draw], Question]
     source: str = "sec. 2"
-    n_vectors: int = 0
     weight: int = 0
     meets: Wall | None = None
-    wanted: str | None = None
-    first_attempts: tuple[int, ...] = ()
     is_delicate: bool = False
 
     def question(self, key: object) -> Question:

@@ -18,10 +18,8 @@ from math import inf
 from typing import Any
 
 from conformance import plain
-from conformance.cases.certify import certify
+from conformance.cases.certify import CONDITIONS, NUDGES, SIGNS, certify, nudged
 from conformance.cases.draw import ATTEMPTS, Draw, Family, Question, Unfit, wire_form
-from conformance.cases.flow_families import any_marks
-from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, nudged
 from conformance.cases.run_families import is_leaning
 from conformance.cases.scenes import LATE
 from conformance.cases.table import FAMILIES
@@ -111,7 +109,7 @@ def _asked(draw: Draw, kind: Kind, asked: Question) -> Question | None:
     data: dict[str, Any] = wire_form(of) | ({"name": of.name} if of.name else {})
     longest = min(asked.longest, CONDITIONS[_delicacy(of, start)])
     question = asked._replace(
-        scene=data, level="core", longest=longest, group=FRESH, collisions=None, flow=None
+        scene=data, level="core", longest=longest, group=FRESH, collisions=None, is_flow=False
     )
     if kind == "step":
         return question
@@ -124,7 +122,7 @@ def _asked(draw: Draw, kind: Kind, asked: Question) -> Question | None:
         return question._replace(collisions=n_hits)
     if len(hits) <= n_hits or not isinstance(before, Collision) or not isinstance(after, Collision | Horizon):
         return None
-    return question._replace(t_end=(before.t + after.t) / 2, collisions=n_hits + 1, flow=any_marks)
+    return question._replace(t_end=(before.t + after.t) / 2, collisions=n_hits + 1, is_flow=True)
 
 
 def _is_steady(of: Scene, question: Question) -> bool:
@@ -136,7 +134,7 @@ def _is_steady(of: Scene, question: Question) -> bool:
     def met(start: State) -> list[str | int]:
         path = plain.trajectory(of, start, question.collisions or 1, question.t_end)
         walls = [hit.wall if isinstance(hit, Collision) else type(hit).__name__ for hit in path]
-        ((_, stay),) = plain.flow(of, [start], question.t_end) if question.flow else [(None, None)]
+        ((_, stay),) = plain.flow(of, [start], question.t_end) if question.is_flow else [(None, None)]
         times = [hit.t for hit in path if isinstance(hit, Collision)]
         return [*walls, *(sum(hit <= t for hit in times) for t in stay or ())]
 

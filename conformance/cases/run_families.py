@@ -13,17 +13,16 @@ the particle comes there and was not when it left the arc, or the other way roun
 from functools import partial
 from math import sqrt
 
-import msgspec
-
 from conformance.cases.draw import Draw, Family, Question, Unfit
-from conformance.cases.flow_families import any_marks
 from conformance.cases.scenes import (
     KINDS,
     LONGEST,
     MOVING,
+    TABLES,
     Clock,
     any_scene,
     clock,
+    deep_wave,
     law,
     many_legs,
     off_its_wall,
@@ -72,19 +71,6 @@ def returning(table: str, wall: Wall, draw: Draw) -> Question:
     leaving = off_its_wall(draw, of, leaving, -3)
     length, units = draw.pick(range(UNITS[0], UNITS[1] + 1)), draw.pick(range(UNITS[0], UNITS[1] + 1))
     return Question(scaled(of, length, units), scaled_state(leaving, length, units), t_end * 2.0**units)
-
-
-def rebounding(table: str, wall: Wall, draw: Draw) -> Question:
-    """Meet a wall that catches up, or nearly, after the bounce: a flow, as lanes find it under way."""
-    asked = returning(table, wall, draw)
-    of, (t, x, y, vx, vy, _) = asked.scene, msgspec.structs.astuple(asked.state)
-    assert not isinstance(of, dict)
-    table_then = rounded(of, t)
-    nx, ny = table_then.normal(wall, x, y)
-    away = 2 * (vx * nx + vy * ny + table_then.receding(wall, y))
-    vx, vy, before = vx - away * nx, vy - away * ny, (of.period or 1.0) * draw.power(-16, -6)
-    start = State(t - before, x - vx * before, y - vy * before, vx, vy)
-    return Question(of, start, asked.t_end, *draw.pick(((40, any_marks), (None, None))))
 
 
 def under_a_growing_cap(draw: Draw) -> Mushroom:
@@ -173,7 +159,27 @@ def vibrating(table: str, draw: Draw) -> Question:
     return Question(of, State(t, xs[0], way * y, (xs[1] - xs[0]) / flight, -way * y / flight), t + 4 * flight)
 
 
+def deep_waves(draw: Draw) -> Question:
+    """Ask about walls of whose laws the mean less all amplitudes says that they may vanish."""
+    shared, table = clock(draw, ("fourier",)), draw.pick(TABLES)
+    of: Scene
+    if table == "cap":
+        of = Cap(r=deep_wave(draw, 0.05, 1.5, shared.rate))
+    elif table == "stem":
+        of = Stem(w=deep_wave(draw, 0.05, 1.0, shared.rate), h=deep_wave(draw, 0.1, 2.0, shared.rate))
+    else:
+        nu = deep_wave(draw, 0.02, 0.9, shared.rate)
+        of = Mushroom(r=deep_wave(draw, 0.05, 1.5, shared.rate), h=draw.short(0.5, 1.5), nu=nu)
+    return Question(of, *state(draw, of, {"speed": draw.power(-4, 2), "patience": draw.pick((1.0, 4.0))}))
+
+
 FAMILIES = (
+    Family(
+        "deep-waves",
+        "amplitudes that add up to more than the mean of a law that is positive all the same",
+        deep_waves,
+        weight=6,
+    ),
     Family("anywhere", "a flight in a scene that no file holds", partial(anywhere, None, None), weight=30),
     *(
         Family(
@@ -192,14 +198,6 @@ FAMILIES = (
             partial(returning, table, wall),
             weight=2,
             meets=wall,
-        )
-        for table, wall in MOVABLE
-    ),
-    *(
-        Family(
-            f"rebounding-{table}-{wall}",
-            "lanes forget the wall just left on the way to another",
-            partial(rebounding, table, wall),
         )
         for table, wall in MOVABLE
     ),

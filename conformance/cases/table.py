@@ -1,24 +1,10 @@
 """The table of families: where every question comes from."""
 
-from conformance.cases import (
-    bound_families,
-    coverage_families,
-    delicate_families,
-    families,
-    flow_families,
-    run_families,
-)
+from conformance.cases import bound_families, delicate_families, run_families
 from conformance.cases.draw import Family
 
 FAMILIES: dict[str, Family] = {
     family.name: family
-    for module in (
-        families,
-        flow_families,
-        coverage_families,
-        run_families,
-        bound_families,
-        delicate_families,
-    )
+    for module in (run_families, bound_families, delicate_families)
     for family in module.FAMILIES
 }

@@ -17,18 +17,32 @@ inputs is the `allowance` that a certified answer carries (`conformance.vectors.
 Both the truth and the answer may be enclosures. Numbers count as right, or as wrong, only where they are so
 for all numbers of the enclosures; else the comparison is `indeterminate`. An answer `undecided` is never
 wrong; callers count it. The reason of an undefined outcome must be the certified one; no other is compared.
+
+The verdict on an answer (`grade`) keeps physics apart from precision. Physics asks for agreement, with less
+than 1e-9 where the condition number is above 1e6 (`physics_bound`). Where the enclosures of the truth are too
+wide to tell, the verdict is `indeterminate`, which is the corpus's defect. Trajectories end before the
+condition number reaches 1e8; only hard case 30 goes on, where the walls are the question.
+
+- `undecided` where an answer is due is `declined`; so is a trajectory that ends so, after right steps.
+- Where a vector allows `rejected` beside an answer (a time so late, numbers so large), `undecided` will do.
+- Where the mathematics gives no answer (`undefined`), `undecided` is right too, and listed in the vector.
+- `rejected` for a valid question is `fail`: what an implementation cannot do it says in its introduction,
+  and is then not asked (`unsupported`, the runner's verdict, as `crashed` and `timed-out` are).
+- An answer {"error": "..."} is `error`; missing or ill-typed fields are `wrong-format`, and so are numbers
+  that are none (JSON has no nan). Further fields are ignored. The reason of `undefined` is compared, others
+  are not.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from conformance.vectors import NUMBERS, Certified, Ends, Expectation
+from conformance.vectors import NUMBERS, Certified, Ends, Expectation, Vector
 from scene import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined, Wall
-from scene.protocol.messages import Answered, AnsweredCollision
+from scene.protocol.messages import Answered, AnsweredCollision, Flown, Steps
 
 U = Fraction(1, 2**53)
 LEAST = Fraction(1, 2**1075)  # half the spacing of subnormal numbers: nothing rounds better
@@ -37,6 +51,12 @@ DIGITS, SHARPEST = Fraction(1, 1000), Fraction(1, 2**43)  # what passes is right
 NEAR_HIT = Fraction(1, 10)  # of the flight time
 # dt, t, place, velocity: what is judged as one vector.
 VECTORS = (("dt",), ("t",), ("x", "y"), ("vx", "vy"))
+PrecisionClass = Literal["A", "B", "C"]
+FORMS: dict[str, Any] = {"step": Answered, "trajectory": Steps, "flow": Flown}
+LOST = ("undefined", "undecided", "rejected")  # may be answered to a whole question
+SHARP, FAIR = 4.0, 1e4  # backward ulps of classes A and B
+# Of several right answers the best grade counts; this is the order.
+_PREFERENCE = ("pass", "indeterminate", "declined", "fail")
 Kind = Literal[
     "agrees",
     "numbers",
@@ -88,7 +108,7 @@ class Agreement(NamedTuple):
     Attributes:
         kind: `agrees`, or what differs first: the `outcome`, the `wall`, the `numbers`, the `length` of a
             trajectory; `undecided` where the answer is; `indeterminate` where the truth cannot tell; `error`
-            or `wrong-format` where nothing was compared (`grading.grade`).
+            or `wrong-format` where nothing was compared (`grade`).
         ulps: worst backward ulps of a component, nan when not measured.
         relative: worst backward error, likewise.
         why: one line.
@@ -372,3 +392,75 @@ def _rounded(number: Fraction | float) -> float:
         return float(number)
     except OverflowError:
         return math.inf
+
+
+def grade(vector: Vector, answer: Any) -> Agreement:
+    """Judge an answer.
+
+    Args:
+        vector: the question and its certified answers.
+        answer: what the implementation sent, decoded: a mapping, or the answer is none.
+
+    Returns:
+        Its `verdict` is pass, fail, indeterminate, declined, error or wrong-format; with the errors measured.
+    """
+    if isinstance(answer, Mapping) and isinstance(answer.get("error"), str):
+        return Agreement("error", why=" ".join(answer["error"].split())[:200])
+    try:
+        parts = _parts(vector, answer)
+        outcomes = [msgspec.convert(msgspec.to_builtins(part), Answered) for part in parts]
+    except (TypeError, msgspec.ValidationError, OverflowError, RecursionError) as error:
+        return Agreement("wrong-format", why=" ".join(str(error).split()))
+    physics = physics_bound(vector.condition)
+    if vector.kind == "flow":
+        captured = getattr(parts[0], "captured", None)
+        found = [
+            compare_arrival(outcomes[0], captured, known, vector.state, physics) for known in vector.expect
+        ]
+    else:
+        asked: Answer | list[Answer] = outcomes if vector.kind == "trajectory" else outcomes[0]
+        found = [compare(asked, known, vector.state, physics=physics) for known in vector.expect]
+    graded = min(found, key=lambda one: _PREFERENCE.index(one.verdict))
+    if graded.verdict == "pass" and not math.isnan(graded.relative) and vector.condition * physics >= 1:
+        none = f"the walls alone are graded: condition {vector.condition:.1g} allows no number"
+        graded = graded._replace(why=none)
+    if graded.verdict == "declined" and {"rejected"} < {known.outcome for known in vector.expect}:
+        graded = graded._replace(kind="agrees", why=f"{graded.why}; a refusal is allowed here")
+    if any(isinstance(outcome, AnsweredCollision) and outcome.dt is None for outcome in outcomes):
+        return graded._replace(why=f"{graded.why}; without dt, t is graded in its place")
+    return graded
+
+
+def precision_class(ulps: Sequence[float]) -> PrecisionClass:
+    """Return the class reached: A for at most 4 backward ulps in all answers, B for 1e4, C for the rest.
+
+    Args:
+        ulps: of the answers that passed; nan (nothing measured) is left out.
+    """
+    worst = max((n for n in ulps if not math.isnan(n)), default=0.0)
+    return "A" if worst <= SHARP else "B" if worst <= FAIR else "C"
+
+
+def _parts(vector: Vector, answer: Any) -> list[Any]:
+    """Decode an answer into the outcomes that it is made of, strictly; a whole refusal is the only one.
+
+    Raises:
+        msgspec.ValidationError: naming the field that is missing or of the wrong type.
+        TypeError: the answer is no object.
+        OverflowError, RecursionError: it is beyond all bounds.
+    """
+    form = Answered if {**answer}.get("outcome") in LOST else FORMS[vector.kind]
+    whole = msgspec.convert({**answer, "seq": 0}, form)
+    parts = list(getattr(whole, "steps", getattr(whole, "states", [whole])))
+    if vector.kind == "flow" and len(parts) != 1:
+        raise msgspec.ValidationError("`states` must be an array of one, as many as were asked")
+    for i, part in enumerate(parts):
+        fields = msgspec.structs.asdict(part)
+        numbers = [*fields.values(), *(fields.get("captured") or ())]
+        if i < len(parts) - 1 and not isinstance(part, AnsweredCollision):
+            raise msgspec.ValidationError(f"steps[{i}]: only the last may be other than a collision")
+        if isinstance(part, AnsweredCollision) and part.wall is None:
+            raise msgspec.ValidationError("`wall` is missing")
+        if not all(math.isfinite(number) for number in numbers if isinstance(number, float)):
+            raise msgspec.ValidationError(f"{part} has a number that is not finite")
+    return parts

@@ -19,7 +19,7 @@ from typing import Any
 import msgspec
 
 from conformance.files import write_file
-from conformance.grading.grade import grade
+from conformance.grading.agreement import grade
 from conformance.mutants import COMMON, MUTANTS, PLAIN, Mutant
 from conformance.vectors import LEVELS, Vector, answer, load, manifest
 from scene import BadInput

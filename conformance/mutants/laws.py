@@ -7,15 +7,15 @@ from mpmath import fp
 from msgspec.structs import replace
 
 from conformance.mutants.mutant import COMMON, Plain, mutant
-from conformance.plain.motion import (
+from conformance.plain.step import (
     BangBangMotion,
     ConstantMotion,
+    Flight,
     FourierMotion,
     Half,
     LawMotion,
     LawValue,
 )
-from conformance.plain.step import Flight
 from scene import BangBang, Fourier, Law, Outcome, Rejected, Scene, State
 from scene.laws import bounds, frequency
 from scene.tables import laws

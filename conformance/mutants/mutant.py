@@ -9,8 +9,7 @@ from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 from conformance import plain
-from conformance.plain.flow import PlainPath
-from conformance.plain.step import Flight
+from conformance.plain.step import Flight, PlainPath
 from scene import Outcome, Scene, State
 from scene.protocol.wire import Captured
 

@@ -6,8 +6,7 @@ from msgspec.structs import replace
 
 from conformance.mutants.laws import single
 from conformance.mutants.mutant import Plain, mutant
-from conformance.plain.flow import CaptureInterval, PlainPath, misses_mouth, width
-from conformance.plain.step import Flight
+from conformance.plain.step import CaptureInterval, Flight, PlainPath, misses_mouth, width
 from scene import Collision, Mushroom, Outcome, State
 from scene.protocol.wire import Captured
 from scene.tables import laws

@@ -6,8 +6,7 @@ from math import hypot
 from msgspec.structs import replace
 
 from conformance.mutants.mutant import COMMON, Plain, mutant
-from conformance.plain.motion import ConstantMotion, LawValue
-from conformance.plain.step import Flight, Gap, UndecidedError
+from conformance.plain.step import ConstantMotion, Flight, Gap, LawValue, UndecidedError
 from scene import Collision, Mushroom, Outcome, Scene, State, Wall
 
 Normal = tuple[float, float, float]

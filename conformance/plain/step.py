@@ -1,19 +1,28 @@
 """A plain stepper: binary64, scalar arithmetic, nothing clever, and right.
 
+A law is seen from departure on: its value then, its rise since, computed without cancellation however short
+the time, and its rate. So no wall is ever evaluated in absolute time.
+
 A particle flies straight until it meets a wall. Every wall is a function f of the flight time s, positive
 inside; |f''| is bounded by what is known of the laws, so on an interval of width d f stays above the lesser
 of its ends less bound * d^2 / 8. That excludes early roots: an interval is passed when the bound proves
 f > 0, solved when f' has one sign and f changes its own, and halved otherwise, left half first. On the wall
 being left f(0) = 0 by definition: f is its rise since, and has no root before 2 f'(0) / bound.
-The third implementation beside `reference` and `fast`, the subject of the tutorial, and what the mutants of
-`conformance.mutants` spoil. Ties within rounding are answered `undecided`.
+
+Then paths, collision after collision, and a particle's first capture interval. The third implementation
+beside `reference` and `fast`, the subject of the tutorial, and what the mutants of `conformance.mutants`
+spoil. Ties within rounding are answered `undecided`.
 """
 
+from bisect import bisect_right
 from collections.abc import Sequence
-from math import hypot, inf
+from functools import cached_property
+from itertools import pairwise
+from math import cos, floor, fmod, hypot, inf, prod, sin
 from typing import ClassVar, NamedTuple
 
-from conformance.plain.motion import BangBangMotion, ConstantMotion, FourierMotion, LawMotion, LawValue
+from mpmath import fp
+
 from scene import (
     BangBang,
     Cap,
@@ -33,15 +42,115 @@ from scene import (
     Wall,
 )
 from scene.geometry import placed
-from scene.laws import bounds
-from scene.states import ON_WALL, check_numbers
-from scene.tables import laws
+from scene.laws import bounds, frequency
+from scene.protocol.wire import Captured
+from scene.states import ON_WALL, Stepper, check_numbers
+from scene.tables import laws, width_factors
 
 ROUNDING = 2.0**-48  # f and f' are sums of a few terms, each rounded to some 2^-52 of its size
 LARGEST = 2.0**400  # squares of greater numbers overflow
 LEAST = 2.0**-500  # squares of smaller ones vanish: f'' of the arc would be 0, and every hit excluded
 MAX_PARTS = 20_000  # intervals looked at for one wall
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
+MAX_COLLISIONS = 20_000  # of one particle's flow: some seconds
+
+
+class LawValue(NamedTuple):
+    """A law seen from departure: its value then, its rise since, its rate now."""
+
+    value: float
+    rise: float
+    rate: float
+
+    @property
+    def now(self) -> float:
+        """The value now."""
+        return self.value + self.rise
+
+
+class ConstantMotion:
+    """A law that is a number."""
+
+    def __init__(self, law: float, t: float) -> None:
+        self.value = law
+
+    def at(self, s: float) -> LawValue:
+        """Return the motion at the time s since departure."""
+        return LawValue(self.value, 0.0, 0.0)
+
+
+class FourierMotion:
+    """A Fourier law from time t on: its waves a cos(f s) + b sin(f s) turned to begin there."""
+
+    def __init__(self, law: Fourier, t: float) -> None:
+        omega = frequency(fp, law)
+        self.waves = [turned(k * omega, a, b, t) for k, a, b in law.harmonics()]
+        self.value = law.mean + sum(a for _, a, _ in self.waves)
+
+    def at(self, s: float) -> LawValue:
+        """Return the motion at the time s since departure; cos(f s) - 1 is -2 sin(f s / 2)^2."""
+        rise = sum(b * sin(f * s) - 2 * a * sin(f * s / 2) ** 2 for f, a, b in self.waves)
+        rate = sum(f * (b * cos(f * s) - a * sin(f * s)) for f, a, b in self.waves)
+        return LawValue(self.value, rise, rate)
+
+
+def turned(f: float, a: float, b: float, t: float) -> tuple[float, float, float]:
+    """Return frequency and amplitudes of a cos(f (t + s)) + b sin(f (t + s)) as a wave in s."""
+    c, s = cos(f * t), sin(f * t)
+    return f, a * c + b * s, b * c - a * s
+
+
+class Half(NamedTuple):
+    """Half a leg: it rests at its knot, an end of it, and accelerates by `pull`."""
+
+    begin: float
+    end: float
+    knot: float
+    value: float
+    pull: float
+
+
+class BangBangMotion:
+    """A bang-bang law from time t on: one period of pieces of constant acceleration."""
+
+    def __init__(self, law: BangBang, t: float) -> None:
+        first, last = law.knots[0][0], law.knots[-1][0]
+        self.period = last - first
+        t -= floor((t - first) / self.period) * self.period
+        halves = [half for (a, u), (b, v) in pairwise(law.knots) for half in self.halves(a, u, b, v)]
+        now = max((i for i, half in enumerate(halves) if half.begin <= t), default=0)
+        half, others = halves[now], halves[now + 1 :] + halves[:now]
+        since = t - half.knot
+        self.value, self.rate = half.value + half.pull * since * since / 2, half.pull * since
+        ends = (half.end - t, half.pull), (t - half.begin, half.pull)
+        self.pieces = [ends[0], *((other.end - other.begin, other.pull) for other in others), ends[1]]
+
+    @cached_property
+    def begins(self) -> list[tuple[float, float, float, float]]:
+        """What each piece begins with, carried on from the one before: time, rise, rate, pull."""
+        begin, rise, rate = 0.0, 0.0, self.rate
+        found = []
+        for duration, pull in self.pieces:
+            found.append((begin, rise, rate, pull))
+            begin += duration
+            rise += (rate + pull * duration / 2) * duration
+            rate += pull * duration
+        return found
+
+    def at(self, s: float) -> LawValue:
+        """Return the motion at the time s since departure."""
+        left = fmod(s, self.period)
+        begin, rise, rate, pull = self.begins[bisect_right(self.begins, (left, inf)) - 1]
+        step = left - begin
+        return LawValue(self.value, rise + (rate + pull * step / 2) * step, rate + pull * step)
+
+    def halves(self, a: float, u: float, b: float, v: float) -> tuple[Half, Half]:
+        """Cut the leg from value u at knot a to value v at knot b in two."""
+        middle, pull = (a + b) / 2, 4 * (v - u) / (b - a) / (b - a)
+        return Half(a, middle, a, u, pull), Half(middle, b, b, v, -pull)
+
+
+LawMotion = ConstantMotion | FourierMotion | BangBangMotion
 
 
 class Gap(NamedTuple):
@@ -391,3 +500,118 @@ def next_collision(scene: Scene, state: State, t_end: float, flight: type[Flight
         return Undecided(str(question))
     except OverflowError:
         return Undecided("a number overflows")
+
+
+class PlainPath:
+    """One particle on its way from hit to hit, and its capture intervals (docs/protocol.md).
+
+    A mutant that errs along the way, and not in a single flight, overrides a method.
+    """
+
+    most = MAX_COLLISIONS  # up to t_end
+
+    def __init__(self, scene: Scene, state: State, t_end: float, step: Stepper = next_collision) -> None:
+        self.scene, self.state, self.t_end, self.step = scene, state, t_end, step
+        self.n_hits = 0
+        self.stay = CaptureInterval()
+        self.stays: list[tuple[float, float]] = []
+
+    def advance(self) -> Outcome:
+        """Take the next step; after a collision the particle stands where it led."""
+        outcome = self.step(self.scene, self.state, self.t_end)
+        if isinstance(outcome, Collision):
+            self.n_hits += 1
+            outcome = self.report(outcome)
+            self.watch(outcome)
+            self.state = self.departure(outcome)
+        return outcome
+
+    def report(self, hit: Collision) -> Collision:
+        """Return a collision as it is answered, and gone on from."""
+        return hit
+
+    def departure(self, hit: Collision) -> State:
+        """Return the state from which the next step starts."""
+        return hit.state()
+
+    def watch(self, hit: Collision) -> None:
+        """Note what a collision means for capture intervals; the state is still that before its flight."""
+        if hit.wall in SIDES:
+            self.close(hit.t)
+        elif hit.wall == "arc" and isinstance(self.scene, Mushroom):
+            self.stay = self.stay.after(hit.t, self.is_captured(self.scene, hit))
+
+    def close(self, t: float) -> None:
+        """End the stay, if one is on, when a wall of the stem is met or at t_end."""
+        if (stay := self.stay.until(t)) is not None:
+            self.stays.append(stay)
+        self.stay = CaptureInterval()
+
+    def is_captured(self, scene: Mushroom, hit: Collision) -> bool:
+        """Tell whether |sin phi_hat| > nu: the chord to an arc hit keeps further from the centre than w."""
+        return misses_mouth(width(scene, hit.t), hit, self.state.vx, self.state.vy)
+
+    def arrival(self) -> tuple[Outcome, Captured]:
+        """Carry the particle to t_end, and return its first capture interval; a lost particle has none."""
+        for _ in range(self.most):
+            outcome = self.advance()
+            if not isinstance(outcome, Collision):
+                break
+        else:
+            outcome = Undecided(f"more than {self.most} collisions")
+        if not isinstance(outcome, Horizon):
+            return outcome, None
+        self.close(self.t_end)
+        return outcome, self.stays[0] if self.stays else None
+
+
+class CaptureInterval(NamedTuple):
+    """What is known of a capture interval: its first captured arc hit, and the first after its last one."""
+
+    begin: float | None = None
+    end: float | None = None
+
+    def after(self, t: float, is_captured: bool) -> "CaptureInterval":
+        """Return the stay after an arc hit: uncaptured hits between captured ones do not divide it."""
+        if is_captured:
+            return CaptureInterval(t if self.begin is None else self.begin)
+        return CaptureInterval(self.begin, t) if self.begin is not None and self.end is None else self
+
+    def until(self, t: float) -> Captured:
+        """Return the stay that ends at t, if it did not before; None where there is none."""
+        return None if self.begin is None else (self.begin, t if self.end is None else self.end)
+
+
+def width(scene: Mushroom, t: float) -> float:
+    """Return the half-width of the mouth at time t."""
+    return float(prod(Flight.kinds[type(law)](law, t).value for law in width_factors(scene)))
+
+
+def misses_mouth(w: float, at: Collision | State, vx: float, vy: float) -> bool:
+    """Tell whether the line through a place keeps further from the centre than w: |x vy - y vx| > w |v|."""
+    return abs(at.x * vy - at.y * vx) > w * hypot(vx, vy)
+
+
+def trajectory(
+    scene: Scene,
+    state: State,
+    n_collisions: int,
+    t_end: float,
+    step: Stepper = next_collision,
+    path: type[PlainPath] = PlainPath,
+) -> list[Outcome]:
+    """Follow a particle by any stepper: its collisions, and last what came instead of one."""
+    along = path(scene, state, t_end, step)
+    steps: list[Outcome] = []
+    while len(steps) < n_collisions:
+        steps.append(along.advance())
+        if not isinstance(steps[-1], Collision):
+            break
+    return steps
+
+
+def flow(
+    scene: Scene, states: Sequence[State], t_end: float, step: Stepper = next_collision
+) -> list[tuple[Outcome, Captured]]:
+    """Carry particles to t_end by any stepper: the outcome of each there, and its first capture interval."""
+    return [PlainPath(scene, state, t_end, step).arrival() for state in states]

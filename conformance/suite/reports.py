@@ -15,7 +15,7 @@ from xml.sax.saxutils import escape
 import msgspec
 from jinja2 import Template
 
-from conformance.grading.grade import PrecisionClass
+from conformance.grading.agreement import PrecisionClass
 from conformance.suite.result import VERDICTS, Result, Run, Scope, Speed
 from scene.protocol.messages import Introduction
 

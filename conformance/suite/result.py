@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from conformance.grading.grade import PrecisionClass, precision_class
+from conformance.grading.agreement import PrecisionClass, precision_class
 from conformance.suite.session import Limits, needs
 from conformance.vectors import Vector
 from scene.protocol.messages import PROFILES, Introduction

@@ -22,8 +22,7 @@ import msgspec
 
 from conformance import vectors
 from conformance.cases.generated import FRESH, ROUND, fresh
-from conformance.grading.agreement import Agreement, middle
-from conformance.grading.grade import grade
+from conformance.grading.agreement import Agreement, grade, middle
 from conformance.mutants.kill_matrix import diagnose
 from conformance.suite.answers import outcomes_of
 from conformance.suite.checks import GROUPS, Implementation, checks_of, run_check, timing

@@ -1,34 +1,45 @@
-"""The suite without a dialogue: every question that hangs on no answer, and the grading of what came back.
+"""Questions and answers in files: the suite without a dialogue.
 
 A sheet holds the questions of a run: the vectors up to a level in the images that its seed draws, the fresh
 ones, and the checks whose questions are known beforehand (`CHECKS`). Each has a sequence number
 that follows from the seed and the question, so that answers tell which questions they belong to. They are
 graded by the code that grades a dialogue: `_Replay` is a session that answers from what was read.
 
+JSON lines are what a program of protocol 1 reads: `./my_stepper < questions.jsonl > answers.jsonl`. As CSV
+there is a file for each scene: the scene's numbers in lines that begin with #, then a row for each state.
+Answers in CSV have a row for each outcome; those of one trajectory or flow follow each other with one seq.
+Numbers may be decimal, with Fortran's exponent D too, or hexadecimal as C's %a writes them.
+
 Not in a sheet: how a process behaves, lines that are no questions, checks that go on from an answer, time.
 """
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import io
-from collections.abc import Mapping, Sequence
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
 from conformance import plain, vectors
-from conformance.suite.answers import check_echo, read_answer, read_introduction, with_walls
+from conformance.files import write_files
+from conformance.suite.answers import UNREADABLE, check_echo, read_answer, read_introduction, with_walls
 from conformance.suite.checks import checks_of, ensembles, run_check
 from conformance.suite.checks.form import QUESTIONS, SuiteCheck
-from conformance.suite.process import CheckFailure
+from conformance.suite.process import CheckFailure, clean
 from conformance.suite.result import LAWS, TABLES, Run
 from conformance.suite.run import RunQuestions, ask_nonsense, converse
 from conformance.suite.session import MAX_SEQ, Session, needs, probe_values
 from conformance.vectors import LEVELS, Vector
-from scene.protocol.messages import PROFILES, PROTOCOL, Introduction
+from scene.protocol.messages import PROFILES, PROTOCOL, Echoed, Introduction
 from scene.protocol.wire import serve
-from scene.refusal import BadInput
+from scene.refusal import BadInput, shown
 
 # Checks whose questions hang on no answer, and by which profiles.
 CHECKS: dict[str, tuple[str, ...]] = {
@@ -52,10 +63,16 @@ CHECKS: dict[str, tuple[str, ...]] = {
 NOT_IN_FILES = ("behaviour as a process", "malformed lines", "checks that go on from an answer")
 REJECTS = "protocol/rejects"
 WORD = 2**32  # a seed is told as two numbers that binary64 holds
+KEY, INDEX = "key", "scenes.txt"  # what the grader keeps; the names of the files, a line each
+SEQ = re.compile(rb'"seq"\s*:\s*(-?[0-9]+)')
+STATE = ("t", "x", "y", "vx", "vy")
+COLUMNS = ("seq", "cmd", "collisions", *STATE, "wall", "t_end")  # of questions
+NEEDED = ("seq", "outcome", *STATE)  # of answers
+OPTIONAL = ("wall", "dt", "t_in", "t_out", "reason")
 
 
 class SheetQuestion(NamedTuple):
-    """A question of a sheet: the case it is of, its sequence number, and the request without it."""
+    """A question of a sheet: the case it is of, its sequence number, and the request, whatever its own is."""
 
     case: str
     seq: int
@@ -95,13 +112,14 @@ class Sheet(RunQuestions):
 
     Attributes:
         questions: by what they ask, in the order of a run.
+        by_number: the same by their sequence numbers.
     """
 
     def __init__(self, level: str, seed: int, proved: Sequence[Vector] | None = None) -> None:
         super().__init__(level, seed, proved=proved)
         self.fresh, self.checks = list(self.fresh), checks_in_files(level)
         self.questions: dict[bytes, SheetQuestion] = {}
-        self._numbers = set[int]()
+        self.by_number: dict[int, SheetQuestion] = {}
         for vector, image in self.vectors():
             self.add(vector.id, vectors.request(image.apply(vector), 0))
         recorder = _Recorder(self)
@@ -117,31 +135,26 @@ class Sheet(RunQuestions):
             return
         digest = hashlib.sha256(f"{self.seed} {self.level} {case} ".encode() + key).digest()
         seq = int.from_bytes(digest[:4], "big") % MAX_SEQ + 1
-        while seq in self._numbers:
+        while seq in self.by_number:
             seq = seq % MAX_SEQ + 1
-        self._numbers.add(seq)
-        self.questions[key] = SheetQuestion(case, seq, {k: v for k, v in request.items() if k != "seq"})
+        self.questions[key] = self.by_number[seq] = SheetQuestion(case, seq, dict(request))
 
     def lines(self) -> list[bytes]:
         """Return the questions as a program of protocol 1 reads them, `start` and `stop` included."""
+        # A program that echoes seed and level hands them back.
+        signature = [float(self.seed // WORD), float(self.seed % WORD), float(LEVELS.index(self.level))]
         hello = {"cmd": "start", "protocol": PROTOCOL}
-        numbers = [{"cmd": "echo", "values": values} for values in (self.signature(), probe_values())]
+        numbers = [{"cmd": "echo", "values": values} for values in (signature, probe_values())]
         begin, end = map(msgspec.json.encode, [hello, *numbers]), msgspec.json.encode({"cmd": "stop"})
         return [*begin, *(question.line for question in self.questions.values()), end]
-
-    def signature(self) -> list[float]:
-        """Return seed and level as numbers, which a program that echoes them hands back."""
-        return [float(self.seed // WORD), float(self.seed % WORD), float(LEVELS.index(self.level))]
 
 
 def signed(echoes: Sequence[bytes]) -> tuple[str, int] | None:
     """Return the level and the seed that answers tell; None where none does."""
     for line in echoes:
-        values = msgspec.json.decode(line).get("values")
-        if isinstance(values, list) and len(values) == 3:
-            high, low, place = (int(number) for number in values)
-            if 0 <= place < len(LEVELS):
-                return LEVELS[place], high * WORD + low
+        with suppress(*UNREADABLE, ValueError, OverflowError, IndexError):
+            high, low, place = map(int, msgspec.json.decode(line, type=Echoed).values)
+            return LEVELS[place], high * WORD + low
     return None
 
 
@@ -162,9 +175,8 @@ def grade_answers(sheet: Sheet, answers: Answers) -> Run:
     Raises:
         BadInput: they are answers to other questions, naming the first question that has none of them.
     """
-    numbers = {question.seq for question in sheet.questions.values()}
     for seq in answers.lines:
-        if seq not in numbers:
+        if seq not in sheet.by_number:
             first = next(q for q in sheet.questions.values() if q.seq not in answers.lines)
             raise BadInput(
                 f"{answers.places.get(seq, answers.source)}: seq = {seq} is of no question of level"
@@ -182,15 +194,15 @@ class _Recorder(Session):
 
     def __init__(self, sheet: Sheet) -> None:
         super().__init__(_plain)
-        self.introduction = offering(PROFILES[:3], TABLES, LAWS)
         self.case, self._sheet = REJECTS, sheet
+        self.start()
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
         self._sheet.add(self.case, request)
         if self.case.startswith("profile/"):
             at = {"outcome": "horizon", "t": request["t_end"]}
             return {"states": [{**state, **at} for state in request["states"]]}
-        return read_answer(_plain(msgspec.json.encode({**request, "seq": 0})), request["cmd"], 0)
+        return super().ask(request)
 
 
 class _Replay(Session):
@@ -201,10 +213,12 @@ class _Replay(Session):
     def __init__(self, sheet: Sheet, answers: Answers) -> None:
         super().__init__([answers.source])
         self._sheet, self._answers = sheet, answers
-        questions = [q for q in sheet.questions.values() if q.seq in answers.lines and q.case != REJECTS]
-        seen = {need for q in questions for need in needs(q.request["cmd"], _scene(q.request))}
+        questions = [q for seq in answers.lines if (q := sheet.by_number[seq]).case != REJECTS]
+        asked = [(q.request["cmd"], q.request["scene"]) for q in questions]
+        seen = {need for cmd, scene in asked for need in needs(cmd, scene if "table" in scene else None)}
         every = ("profile", PROFILES), ("table", TABLES), ("law", LAWS)
-        self.introduction = offering(*(tuple(n for n in names if (what, n) in seen) for what, names in every))
+        offered = (tuple(name for name in names if (what, name) in seen) for what, names in every)
+        self.introduction = Introduction(PROTOCOL, "answers in files", "", "unknown", *offered)
 
     def start(self) -> Introduction:
         if self._answers.introduction is None:
@@ -229,11 +243,6 @@ class _Replay(Session):
         return with_walls(read_answer(line, request["cmd"], question.seq), request.get("scene"))
 
 
-def offering(profiles: Sequence[str], tables: Sequence[str], laws: Sequence[str]) -> Introduction:
-    """Return the introduction of answers without one."""
-    return Introduction(PROTOCOL, "answers in files", "", "unknown", *map(tuple, (profiles, tables, laws)))
-
-
 def _enveloped(line: bytes, cmd: str, seq: int) -> bytes:
     """Return outcomes as an answer of protocol 1; a lone refusal is of the whole question."""
     parts = msgspec.json.decode(line)
@@ -244,14 +253,224 @@ def _enveloped(line: bytes, cmd: str, seq: int) -> bytes:
     return msgspec.json.encode({"seq": seq, **whole})
 
 
-def _scene(request: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    scene = request.get("scene")
-    return scene if isinstance(scene, Mapping) and "table" in scene else None
-
-
 def _plain(line: bytes) -> bytes:
     """Answer a line as the plain stepper does."""
     out = io.BytesIO()
     steppers = plain.next_collision, plain.trajectory
     serve("plain", *steppers, io.BytesIO(line), out, flow=plain.flow)
     return out.getvalue()
+
+
+class Key(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the grader of a sheet need not find out again: level, seed, corpus, and the proved questions."""
+
+    level: str
+    seed: int
+    corpus: str
+    fresh: tuple[Vector, ...]
+
+
+def write_lines(sheet: Sheet, path: Path) -> int:
+    """Write questions as JSON lines, and the key beside them; return how many there are."""
+    lines = b"\n".join([*sheet.lines(), b""])
+    write_files(path.parent, {path.name: lines, key_file(path).name: _key(sheet)})
+    return len(sheet.questions)
+
+
+def write_tables(sheet: Sheet, folder: Path) -> int:
+    """Write questions as CSV into an existing folder, a file a scene; return how many there are.
+
+    Questions about what is no scene or no state, which are to be refused, are left out.
+    """
+    by_scene: dict[str, list[SheetQuestion]] = {}
+    for question in sheet.questions.values():
+        if question.case == REJECTS:  # a state without vy
+            continue
+        try:
+            by_scene.setdefault("".join(_scene_lines(question.request["scene"])), []).append(question)
+        except (TypeError, AttributeError, ValueError):
+            continue
+    names = {f"{number:05d}.csv": scene for number, scene in enumerate(by_scene, 1)}
+    files: dict[str, Any] = {name: scene + "".join(_rows(by_scene[scene])) for name, scene in names.items()}
+    write_files(folder, {**files, INDEX: "".join(f"{name}\n" for name in names), KEY: _key(sheet)})
+    return sum(map(len, by_scene.values()))
+
+
+def key_file(questions: Path) -> Path:
+    """Return where the key of a file of questions is."""
+    return questions / KEY if questions.is_dir() else questions.with_name(f"{questions.name}.{KEY}")
+
+
+def read_key(questions: Path) -> Sheet:
+    """Return the sheet that a file or folder of questions was written from.
+
+    Raises:
+        BadInput: there is no key, it is damaged, or of another corpus.
+    """
+    path = key_file(questions)
+    try:
+        key = msgspec.json.decode(path.read_bytes(), type=Key)
+    except (OSError, *UNREADABLE) as error:
+        raise BadInput(f"--questions: the key {str(path)!r} cannot be read: {error}") from None
+    if key.corpus != vectors.manifest().digest:
+        raise BadInput(f"--questions: {str(path)!r} is of another corpus: write the questions anew")
+    return Sheet(key.level, key.seed, key.fresh)
+
+
+def read_answers(path: Path) -> Answers:
+    """Read a file of answers: JSON lines, or CSV by its ending, or a folder of CSV files.
+
+    Raises:
+        BadInput: in one line, with the place.
+    """
+    files = sorted(path.glob("*.csv")) if path.is_dir() else [path]
+    is_table = path.is_dir() or path.suffix == ".csv"
+    try:
+        found = _of_tables(files, path) if is_table else _of_lines(path)
+    except OSError as error:
+        raise BadInput(f"answers {str(path)!r} cannot be read: {error.strerror}") from None
+    if not found.lines:
+        raise BadInput(f"answers {str(path)!r}: holds no answer")
+    return found
+
+
+def _key(sheet: Sheet) -> bytes:
+    return msgspec.json.encode(Key(sheet.level, sheet.seed, vectors.manifest().digest, tuple(sheet.fresh)))
+
+
+def _scene_lines(scene: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a scene as lines of words: # law kind field place number."""
+    yield f"# table {scene['table']}\n"
+    for name, law in scene.items():
+        if name not in ("table", "name", "notes"):
+            kind = law["kind"] if isinstance(law, Mapping) else "constant"
+            for field, numbers in _fields(law).items():
+                for place, number in enumerate(numbers, 1):
+                    yield f"# {name} {kind} {field} {place} {float(number)!r}\n"
+
+
+def _fields(law: Any) -> dict[str, Sequence[float]]:
+    """Return the numbers of a law by their names; a bang-bang law has times and values."""
+    if not isinstance(law, Mapping):
+        return {"value": [law]}
+    if "knots" in law:
+        times, values = zip(*law["knots"], strict=True)
+        return {"time": times, "value": values}
+    fields = {name: part for name, part in law.items() if name != "kind"}
+    return {name: part if isinstance(part, list | tuple) else [part] for name, part in fields.items()}
+
+
+def _rows(questions: Sequence[SheetQuestion]) -> Iterator[str]:
+    yield ",".join(COLUMNS) + "\n"
+    for question in questions:
+        request = question.request
+        for state in request.get("states") or [request["state"]]:
+            numbers = [repr(float(state[name])) for name in STATE]
+            cells = [question.seq, request["cmd"], request.get("collisions", 1), *numbers]
+            yield ",".join(map(str, [*cells, state.get("wall") or "", repr(float(request["t_end"]))])) + "\n"
+
+
+def _of_lines(path: Path) -> Answers:
+    found: dict[int, bytes] = {}
+    places: dict[int, str] = {}
+    introduction, echoes = None, []
+    for number, line in enumerate(path.read_bytes().split(b"\n"), 1):
+        place = f"answers {str(path)!r}:{number}"
+        if seq := SEQ.search(line):
+            _once(places, int(seq[1]), place)
+            found[int(seq[1])] = line
+        elif b'"protocol"' in line:
+            introduction = line
+        elif b'"values"' in line:
+            echoes.append(line)
+        elif line.strip():
+            said = clean(line[:60].decode("utf-8", "replace"))
+            raise BadInput(f"{place}: has no seq, must have that of its question: {said}")
+    return Answers(str(path), found, introduction, tuple(echoes), places)
+
+
+def _once(places: dict[int, str], seq: int, place: str) -> None:
+    if seq in places:
+        raise BadInput(f"{place}: seq = {seq} is answered twice, first at {places[seq].rpartition(':')[2]}")
+    places[seq] = place
+
+
+def _of_tables(files: Sequence[Path], source: Path) -> Answers:
+    rows: dict[int, list[dict[str, Any]]] = {}
+    places: dict[int, str] = {}
+    for path in files:
+        last, label = None, f"answers {str(path)!r}"
+        for place, cells in read_rows(path, label, NEEDED, (*NEEDED, *OPTIONAL)):
+            number = read_number(place, "seq", cells["seq"])
+            if not number.is_integer():
+                raise BadInput(f"{place}: seq = {shown(cells['seq'])}, must be a whole number")
+            seq = int(number)
+            if seq != last:
+                _once(places, seq, place)
+            rows.setdefault(seq, []).append(_outcome(place, cells))
+            last = seq
+    lines = {seq: msgspec.json.encode(parts) for seq, parts in rows.items()}
+    return Answers(str(source), lines, None, (), places)
+
+
+def read_rows(
+    path: Path, label: str, needed: Sequence[str], known: Sequence[str] | None = None
+) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield the rows of a CSV file by the names of its columns, each with its place; # begins a comment.
+
+    Args:
+        path: of the file.
+        label: what messages begin with.
+        needed: columns that must be there.
+        known: columns that there may be; None for any.
+
+    Raises:
+        BadInput: naming the column, or the place.
+    """
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        reader = csv.reader(file)
+        rows = (row for row in reader if any(map(str.strip, row)) and not row[0].startswith("#"))
+        try:
+            names = [name.strip() for name in next(rows, [])]
+            lacking = [name for name in needed if name not in names]
+            twice = [name for i, name in enumerate(names) if name in names[:i]]
+            unknown = [name for name in names if known and name not in known]
+            for fault, found in (("is missing", lacking), ("stands twice", twice), ("is unknown", unknown)):
+                if found:
+                    which = f"; columns are {', '.join(known)}" if known else ""
+                    raise BadInput(f"{label}: column {shown(found[0])} {fault}{which}")
+            for row in rows:
+                place = f"{label}:{reader.line_num}"
+                if len(row) != len(names):
+                    raise BadInput(f"{place}: {len(row)} cells, must be {len(names)} as in the first row")
+                yield place, dict(zip(names, map(str.strip, row), strict=True))
+        except (csv.Error, UnicodeDecodeError) as error:
+            why = error if isinstance(error, csv.Error) else "it is no UTF-8"
+            raise BadInput(f"{label}:{reader.line_num}: {why}") from None
+
+
+def _outcome(place: str, cells: Mapping[str, str]) -> dict[str, Any]:
+    """Return a row as an outcome of protocol 1; what it does not hold is left out."""
+    words = {name: cells[name] for name in ("wall", "reason") if cells.get(name)}
+    names = (*STATE, "dt", "t_in", "t_out")
+    numbers = {name: read_number(place, name, cells[name]) for name in names if cells.get(name)}
+    ends = [numbers.pop(name) for name in ("t_in", "t_out") if name in numbers]
+    is_told = cells["outcome"] == "horizon" and ("t_in" in cells or "t_out" in cells)
+    captured = {"captured": ends or None} if is_told else {}
+    return {"outcome": cells["outcome"], "reason": "", **words, **numbers, **captured}
+
+
+def read_number(place: str, name: str, text: str) -> float:
+    """Return a number written in decimal, with Fortran's D, or hexadecimal with p.
+
+    Raises:
+        BadInput: it is none, or not finite.
+    """
+    try:
+        word = text.lower()
+        number = float.fromhex(word) if "0x" in word else float(word.replace("d", "e"))
+    except (ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise BadInput(f"{place}: {name} = {shown(text)}, must be a finite number, decimal or as 0x1.8p+3")
+    return number

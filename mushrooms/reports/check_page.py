@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib import rc_context
 
 from conformance import vectors
-from conformance.grading.grade import FAIR, SHARP
+from conformance.grading.agreement import FAIR, SHARP
 from conformance.suite import reports
 from conformance.suite.result import Result, Run
 from conformance.vectors import Vector

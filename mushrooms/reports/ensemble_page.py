@@ -1,4 +1,4 @@
-"""The page of an ensemble's audit: verdict, likely causes, figures with theory over them, every check."""
+"""The report of an ensemble's audit: verdict, likely causes, every check; as a page with figures, as text."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from matplotlib import rc_context
 from conformance.audit.ensemble import GivenEnsemble, expected
 from mushrooms.figures import energies
 from mushrooms.figures.style import ORANGE, SKY, STYLE, new_figure, svg
+from mushrooms.reports.audit_page import expected_text, figures_text, power_text
 from mushrooms.reports.page import embed, render
 
 N_BINS = 50
 MOST_DRAWN = 1_000_000  # values that a histogram is of; of more, evenly spaced ones
 SIGNS = {True: ("✓", "good"), False: ("✗", "bad"), None: ("?", "open")}
+WORDS = {True: "holds", False: "FAILS", None: "open"}
 
 
 def to_html(data: dict[str, Any], given: GivenEnsemble) -> str:
@@ -29,6 +31,25 @@ def to_html(data: dict[str, Any], given: GivenEnsemble) -> str:
         energies=embed(first),
         times=embed(times) if times else None,
     )
+
+
+def to_text(data: dict[str, Any]) -> str:
+    """Return the report as lines."""
+    lines = [
+        f"{data['ensemble']} against {data['scene']}: {data['verdict']}",
+        f"{data['particles']:,} particles, {data['lost']:,} without an energy",
+        *(f"note: {note}" for note in data["notes"]),
+    ]
+    for check in data["checks"]:
+        found = f"{figures_text(check)}, must be {expected_text(check)}"
+        found += f"; left out {check['band']:.2g}" if check["band"] else ""
+        found += f"; pull {check['pull']:+.1f}" if check["pull"] is not None else ""
+        found += f"; detects {power_text(check)}" if check["sees"] is not None else ""
+        lines.append(f"{WORDS[check['holds']]:5}  {check['what']}: {found}")
+    lines += [f"likely cause: {cause}" for cause in data["causes"]]
+    if data["verdict"] == "refuted" and not data["causes"]:
+        lines.append("likely cause: none of those that are known")
+    return "\n".join(lines) + "\n"
 
 
 @rc_context(STYLE)

@@ -20,9 +20,8 @@ import msgspec
 
 import reference
 from conformance import verify
-from conformance.cases.certify import arrival, capture_intervals, marks
-from conformance.cases.prover import coasted, collided
-from conformance.cases.prover import ends as exact_ends
+from conformance.cases.certify import arrival, capture_intervals, coasted, collided, marks
+from conformance.cases.certify import ends as exact_ends
 from conformance.vectors import Certified, certified
 from scene import State, from_data
 from support.falsifier import CORPUS, NUMBERS, Flight, Line, next_hits, numbers

@@ -8,7 +8,7 @@ from msgspec import to_builtins
 import reference
 import scene as scenes
 from conformance import vectors
-from conformance.cases.prover import proved_step
+from conformance.cases.certify import proved_step
 from conformance.grading.agreement import middle
 from reference.arithmetic import Enclosure
 from scene import Scene, State

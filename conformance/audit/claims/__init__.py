@@ -12,7 +12,6 @@ from conformance.audit.claims import (
     experiments,
     exponents,
     finite_energy,
-    identities,
     many_cycles,
     misprints,
 )
@@ -24,7 +23,6 @@ CHECKS = {
     **finite_energy.CHECKS,
     **experiments.CHECKS,
     **exponents.CHECKS,
-    **identities.CHECKS,
     **assumptions.CHECKS,
     **many_cycles.CHECKS,
 }

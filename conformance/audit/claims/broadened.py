@@ -116,9 +116,8 @@ def width_as_predicted(what: str, found: Mean, sample: Sample, **options: Any) -
     return close(what, found, sigma, band=sigma * left.variance / 2, **options)
 
 
-def peak_band(sample: Sample) -> float:
+def peak_band(found: theory.FiniteEnergy) -> float:
     """Return how far the theory's error may move the distribution function of the uncaptured."""
-    found = predicted(sample)
     left = found.theory_error
     sigma = math.sqrt(found.peak[1])
     return PEAK_DENSITY * left.peak_mean / sigma + WIDENED * left.variance + SKEWED * left.skewness

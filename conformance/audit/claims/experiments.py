@@ -93,7 +93,7 @@ def peak_shape(sample: Sample) -> Check:
         return np.asarray(norm.cdf(s, s_nc, sigma))
 
     note, rival = f"of a Gaussian at log E_nc {chance(kept, still):.1g}", ("a Gaussian at log E_nc", still)
-    return fits(what, kept, found.free_cdf, band=peak_band(sample), scale=0.2, note=note, against=rival)
+    return fits(what, kept, found.free_cdf, band=peak_band(found), scale=0.2, note=note, against=rival)
 
 
 def peak_width(sample: Sample) -> Check:
@@ -198,7 +198,7 @@ def ergodic(evidence: ClaimEvidence) -> list[Check]:
     ratio = (found.peak[1] / predicted(earlier).peak[1]) ** 0.5
     return [
         less_bias(GROWTH, sample, 0.0, start=""),
-        fits("one peak, as predicted", sample.gain, found.free_cdf, band=peak_band(sample), scale=0.2),
+        fits("one peak, as predicted", sample.gain, found.free_cdf, band=peak_band(found), scale=0.2),
         close("mean of E0/E1", mean(np.exp(-sample.gain)), found.mean_of_exp(-1), band=left.mean_s),
         stated("nobody is captured", not sample.captured.any(), f"{sample.captured.sum()} captured", "0"),
         close(

@@ -10,7 +10,7 @@ from functools import partial
 
 from conformance import properties
 from conformance.cases.draw import Draw
-from conformance.suite.checks import flows, paths, refusals, requests, timing
+from conformance.suite.checks import flows, paths, requests, timing
 from conformance.suite.checks.ensembles import ensemble_checks
 from conformance.suite.checks.form import QUESTIONS, Implementation, Question, SuiteCheck, run_check
 from conformance.suite.session import AnswerLine, Session
@@ -71,9 +71,9 @@ RULES = (
     SuiteCheck("promise/minus-zero", requests.zeros, requests.same),
     SuiteCheck("promise/malformed-lines", requests.bad_lines, requests.passed_over),
     SuiteCheck("promise/extra-fields", requests.further_fields, requests.ignored_or_refused),
-    SuiteCheck("promise/bad-requests", refusals.requests, refusals.refuse, ALL),
-    SuiteCheck("promise/bad-states", refusals.bad_states, refusals.refuse),
-    SuiteCheck("promise/bad-scenes", refusals.bad_scenes, refusals.refuse),
+    SuiteCheck("promise/bad-requests", requests.bad_requests, requests.refuse, ALL),
+    SuiteCheck("promise/bad-states", requests.bad_states, requests.refuse),
+    SuiteCheck("promise/bad-scenes", requests.bad_scenes, requests.refuse),
     SuiteCheck("promise/time-steps", timing.questions, timing.same_steps, ("time",)),
     SuiteCheck("promise/time-clock", timing.questions, timing.honest_clock, ("time",)),
 )

@@ -24,7 +24,7 @@ from conformance.suite.checks.paths import (
     is_same_capture,
     nearly_captured,
 )
-from conformance.suite.checks.refusals import INSIDE, RESTING, move_inwards
+from conformance.suite.checks.requests import INSIDE, RESTING, move_inwards
 from scene import (
     Cap,
     Collision,

@@ -53,7 +53,7 @@ class Implementation:
         session: with the implementation.
         profile: step, trajectory or flow (or time).
         n_asked, n_undecided: outcomes counted so far.
-        errors: of its numbers so far, by what they are of (`checks.flaws`).
+        errors: of its numbers so far, by what they are of (`checks.paths`).
     """
 
     def __init__(self, session: Session, profile: str) -> None:

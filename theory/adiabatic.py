@@ -11,7 +11,8 @@ gains are independent and add up (theory/equations.md derives it).
 On every piece nu = nu_upper - (nu_upper - nu_lower) I(u), where I is the polynomial that
 leaves 0 as u^p and reaches 1 as (1 - u)^q: with the piece's orders p, q all this is analytic in
 u on [0, 1]. Where nu would turn a hair beyond a piece's end, times are nearly singular there: nu_upper or
-nu_lower is then that turn's, and the piece a part of [0, 1]. Intervals of u are halved until Chebyshev interpolation resolves them.
+nu_lower is then that turn's, and the piece a part of [0, 1]. Intervals of u are halved until Chebyshev
+interpolation resolves them.
 """
 
 from __future__ import annotations

@@ -159,7 +159,8 @@ def density_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, .
         def density(level: Any) -> Any:
             total = found.binary.zero
             for panel, (a, b, s_a, s_b) in stretches:
-                if abs(s_a - s_b) > resolution and min(s_a, s_b) < level < max(s_a, s_b):
+                # A level within rounding of an end is taken to lie beside it: the density jumps there.
+                if min(s_a, s_b) + resolution < level < max(s_a, s_b) - resolution:
                     x = panel.root(a, b, bool(s_a < s_b), level)
                     total += panel.flow(x) / abs(panel.s_rate(x))
             return total

@@ -72,20 +72,22 @@ def spans(ctx: Any, scene: Mushroom) -> list[Span]:
         )
     if kinds == {BangBang}:
         return list(_bang_bang_spans(ctx, legs, width, radius))
-    found = _fourier_spans(ctx, scene, width, radius)
-    return _cut(ctx, found, [a for a, _ in leg_intervals(legs)], scene) if legs else found
+    shared = period(scene)
+    assert shared is not None
+    found = _fourier_spans(ctx, shared.value(ctx), width, radius)
+    if not legs:
+        return found
+    assert shared.length is not None
+    return _cut(ctx, found, [a % shared.length for a, _ in leg_intervals(legs)], shared.length)
 
 
-def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], scene: Mushroom) -> list[Span]:
+def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], whole: Fraction) -> list[Span]:
     """Cut spans of a Fourier mouth where bang-bang laws of radius, depth or slope are not analytic.
 
     The ends of the spans are rounded to the context's precision; a cut that lies nearer to an end than that
     rounding is taken for the end itself.
     """
-    shared = period(scene)
-    assert shared is not None
-    assert shared.length is not None
-    length = shared.value(ctx)
+    length = number(ctx, whole)
     near = ctx.ldexp(length, 16 - ctx.prec)
     pieces = []
     for span in found:
@@ -93,7 +95,7 @@ def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], scene: Mushroom) -> 
         first, last = (floor(t / length) for t in (span.start, span.end))
         for turn in range(first - 1, last + 2):
             for cut in cuts:
-                time = number(ctx, cut % shared.length + turn * shared.length)
+                time = number(ctx, cut + turn * whole)
                 if span.start + near < time < span.end - near:
                     times.append((time, 1))
         times = [*sorted(times), (span.end, span.end_order)]
@@ -122,15 +124,12 @@ def _bang_bang_spans(ctx: Any, moving: list[BangBang], width: Law, radius: Law) 
             yield Span(times[i], times[i + 1], orders[i], orders[i + 1], (a + b) / 2, critical)
 
 
-def _fourier_spans(ctx: Any, scene: Mushroom, width: Law, radius: Law) -> list[Span]:
+def _fourier_spans(ctx: Any, length: Any, width: Law, radius: Law) -> list[Span]:
     (w, n_w), (r, n_r) = half_angle(width), half_angle(radius)
     (dw, _), (dr, _) = half_angle(width, 1), half_angle(radius, 1)
     slope = exact.add(exact.multiply(dw, r), exact.scale(exact.multiply(w, dr), Fraction(-1)))
     if not slope:
         return []
-    shared = period(scene)
-    assert shared is not None
-    length = shared.value(ctx)
     found = [(ctx.zero + length / 2, 2 * (n_w + n_r) - (len(slope) - 1))]  # x = infinity
     bound = exact.root_bound(slope)
     for root in _roots(slope, -bound, bound):

@@ -218,12 +218,6 @@ def converged(
     raise NotConverged(f"two resolutions in a row do not agree to {digits} digits")
 
 
-class _Solution:
-    """A place for the numbers of one solution."""
-
-    well: SolvedWell | None = None
-
-
 def solved(
     scene: Scene, cycle: Cycle, target: int, on_progress: Callable[[float], None] | None = None
 ) -> Captures:
@@ -241,16 +235,15 @@ def solved(
     if cycle.digits > FEW_DIGITS:
         return captures(cycle, target, on_progress)
     place = _place(tuple(laws(scene).items()), cycle.digits, target)
-    if place.well is None:
-        found = captures(cycle, target, on_progress)
-        place.well = found.root
-        return found
-    if on_progress is not None:
+    if not place:
+        place.append(captures(cycle, target, on_progress).root)
+    elif on_progress is not None:
         on_progress(1.0)
     with cycle.binary.working():
-        return Captures(cycle, grids_for(cycle.binary, target), target, place.well)
+        return Captures(cycle, grids_for(cycle.binary, target), target, place[0])
 
 
 @lru_cache(maxsize=KEPT)
-def _place(given: tuple[tuple[str, Law], ...], digits: int, target: int) -> _Solution:
-    return _Solution()
+def _place(given: tuple[tuple[str, Law], ...], digits: int, target: int) -> list[SolvedWell]:
+    """Return the place of a solution: a list, empty at first."""
+    return []

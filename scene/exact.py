@@ -5,9 +5,9 @@ The laws of a scene become polynomials in half angles or in time, and conditions
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cache
 from itertools import pairwise
 from math import comb, gcd, lcm
 
@@ -173,15 +173,15 @@ class Sturm:
         while chain[-1]:
             chain.append(scale(remainder(chain[-2], chain[-1]), Fraction(-1)))
         self.chain = chain[:-1]
+        self._variations = cache(self._count_variations)  # intervals that are halved share their ends
 
-    def _variations(self, x: Fraction) -> int:
+    def _count_variations(self, x: Fraction) -> int:
         signs = [v > 0 for v in (at(q, x) for q in self.chain) if v != 0]
-        return sum(a != b for a, b in itertools.pairwise(signs))
+        return sum(a != b for a, b in pairwise(signs))
 
     def n_roots(self, a: Fraction, b: Fraction) -> int:
         """Count the distinct roots in the open interval (a, b)."""
-        n_half_open = self._variations(a) - self._variations(b)
-        return n_half_open - (at(self.p, b) == 0)
+        return self._variations(a) - self._variations(b) - (at(self.p, b) == 0)
 
 
 def negative_point(p: Polynomial, a: Fraction, b: Fraction) -> Fraction | None:

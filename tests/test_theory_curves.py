@@ -71,14 +71,6 @@ def test_masses_make_up_the_captured_and_their_means(name: str) -> None:
     assert np.sqrt(square) == pytest.approx(float(found.sd), abs=1e-5)
 
 
-def test_energy_masses_agree_with_a_histogram_of_the_curve() -> None:
-    edges = np.linspace(-0.5, 0.9, 15)
-    curve = capture_curve(load("moving-cap"), 40_001)
-    weights = curve.p_cha[:-1] - curve.p_cha[1:]
-    counted, _ = np.histogram((curve.s[1:] + curve.s[:-1]) / 2, bins=edges, weights=weights)
-    np.testing.assert_allclose(energy_density(load("moving-cap"), edges), counted, atol=2e-4)
-
-
 def test_capture_time_masses_are_differences_of_p_cha() -> None:
     scene = load("moving-cap")
 

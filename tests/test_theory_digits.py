@@ -8,7 +8,7 @@ from mpmath import MPContext
 import scene
 import theory
 from theory.adiabatic import captures
-from theory.chebyshev import FEW, Grid, even_degree
+from theory.chebyshev import Grid, even_degree
 from theory.critical import MANY_BITS, solve_rising
 from theory.cycle import Cycle
 
@@ -53,7 +53,7 @@ def test_halves_put_together_wrongly_would_be_seen(ctx):
 
 def test_a_degree_is_rounded_up_to_what_halves_well():
     assert [even_degree(n) for n in (62, 88)] == [64, 88]
-    for n in range(FEW, 2200, 2):
+    for n in range(200, 2200, 2):
         found = even_degree(n)
         assert n <= found <= 1.1 * n
         odd = found
@@ -80,9 +80,9 @@ def test_a_root_has_all_its_digits_and_is_found_with_few():
 
 def test_many_digits_are_what_they_were():
     digits, told = 84, []
-    assert even_degree(2 * (12 + digits + 4)) >= FEW  # so that all of the above is at work
     found = captures(Cycle.of(scene.load("moving-cap"), digits), digits + 4, told.append)
-    assert abs(found.growth() - found.cycle.ctx.mpf(M1)) < found.cycle.ctx.mpf(10) ** -digits
+    with found.binary.working():
+        assert abs(found.growth() - found.binary.mpf(M1)) < found.binary.mpf(10) ** -digits
     assert told == sorted(told)
     assert (told[0], told[-1]) == (0.0, 1.0)
 
@@ -91,7 +91,8 @@ def test_many_digits_of_a_cycle_that_gains_nothing():
     """Its log g is rounding alone, which no number of points resolves, nor need they."""
     digits = 84
     found = captures(Cycle.of(scene.load("moving-cap-trivial"), digits), digits + 4)
-    assert abs(found.growth()) < found.cycle.ctx.mpf(10) ** -digits
+    with found.binary.working():
+        assert abs(found.growth()) < found.binary.mpf(10) ** -digits
     assert len(found.placed) < 50
 
 
@@ -102,11 +103,3 @@ def test_progress_tells_the_resolution_and_how_far_it_is(monkeypatch):
     assert told == sorted(told)
     assert {number for number, _ in told} == {1, 2}
     assert told[-1] == (2, 1.0)
-
-
-@pytest.mark.parametrize("n", [16, 256])
-@pytest.mark.parametrize("bad", ["inf", "nan"])
-def test_a_sample_that_is_no_number_is_not_lost(ctx, n, bad):
-    """Sums are taken in whole numbers, which know none of them."""
-    samples = [ctx.mpf(bad), *map(ctx.mpf, range(n))]
-    assert any(ctx.isnan(c) for c in Grid(ctx, n).coefficients(samples))

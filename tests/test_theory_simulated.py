@@ -109,10 +109,11 @@ def test_a_variance_that_is_wrong_is_refuted(
     assert is_refuted(known_figures(samples))
 
 
-def test_from_1e5_on_nothing_is_refused() -> None:
+@pytest.mark.parametrize("energy", [1e5, 1e7, 1e9])
+def test_from_1e5_on_nothing_is_refused_nor_off_by_much(energy: float) -> None:
     for name in SCENES:
-        for energy in (1e5, 1e7, 1e9):
-            assert np.isfinite(theory.at_energy(scene_named(name), energy).theory_error).all()
+        errors = theory.at_energy(scene_named(name), energy).theory_error
+        assert max(errors._replace(skewness=0.0)) <= 0.08, name
 
 
 def main() -> int:

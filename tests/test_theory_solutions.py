@@ -22,9 +22,10 @@ def _nothing_kept() -> None:
 
 def bits(found: Captures) -> Any:
     def of(numbers: Any) -> Any:
-        return numbers._mpf_ if hasattr(numbers, "_mpf_") else tuple(map(of, numbers))
+        return numbers.as_mantissa_exp() if hasattr(numbers, "is_nan") else tuple(map(of, numbers))
 
-    return of(found.root), of(found.point_masses), of([found.growth(), found.p_not_captured])
+    with found.binary.working():
+        return of(found.root), of(found.point_masses), of([found.growth(), found.p_not_captured])
 
 
 @pytest.mark.parametrize("scene", [load("moving-cap"), TWICE], ids=["moving-cap", "twice"])
@@ -65,9 +66,9 @@ def test_nobody_is_touched_by_what_another_does_with_its_numbers() -> None:
     right = predict(TWICE, 3).strings(3)
     spoilt = predict(TWICE, 3)
     spoilt.m1.context.dps = 1
-    assert predict(TWICE, 3).strings(3) == right
-    first, second = (solved(TWICE, Cycle.of(TWICE, 3), 7) for _ in range(2))
-    assert first.root.B_end.context is not second.root.B_end.context
+    again = predict(TWICE, 3)
+    assert again.strings(3) == right
+    assert again.m1.context is not spoilt.m1.context
 
 
 def test_the_whole_of_it_is_told_as_done() -> None:

@@ -164,8 +164,8 @@ def test_a_model_without_recapture_is_refused(solved: Energies) -> None:
 @pytest.mark.deep
 def test_mean_exp_minus_s_is_one_to_40_digits_with_recapture() -> None:
     found = captures(Cycle.of(TWICE, 40), 46)
-    ctx = found.cycle.ctx
-    assert abs(found.taylor(-1, 0)[0] - 1) < ctx.mpf(10) ** -40
+    with found.binary.working():
+        assert abs(found.taylor(-1, 0)[0] - 1) < found.binary.mpf(10) ** -40
 
 
 def test_means_over_points_and_power_series_are_two_ways_to_one_number() -> None:

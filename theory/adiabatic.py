@@ -10,7 +10,9 @@ not captured on a well's own pieces passes through its children one after anothe
 gains are independent and add up (theory/equations.md derives it).
 On every piece nu = nu_upper - (nu_upper - nu_lower) I(u), where I is the polynomial that
 leaves 0 as u^p and reaches 1 as (1 - u)^q: with the piece's orders p, q all this is analytic in
-u on [0, 1]. Intervals of u are halved until Chebyshev interpolation resolves them.
+u on [0, 1]. Where nu would turn a hair beyond a piece's end, times are nearly singular there: nu_upper or
+nu_lower is then that turn's, and the piece a part of [0, 1]. Intervals of u are halved until Chebyshev
+interpolation resolves them.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from typing import Any, NamedTuple
 
 from scene.refusal import BadInput
 from theory.chebyshev import Grid, WeightedPoints, convolve, even_degree, product, shifted
+from theory.critical import solve_rising
 from theory.cycle import CapturePiece, Cycle, NuWell
 from theory.precision import Binary
 from theory.volumes import free_share
@@ -112,6 +115,11 @@ class Captures:
     target: int
     root: SolvedWell
 
+    @property
+    def binary(self) -> Binary:
+        """The numbers that all this is told in; they are to be computed with under its `working`."""
+        return self.cycle.binary
+
     def grid(self, panel: Panel) -> Grid:
         """Return the grid on whose points a panel is sampled."""
         return self.grids[len(panel.nu) - 1]
@@ -124,7 +132,7 @@ class Captures:
     @property
     def p_not_captured(self) -> Any:
         """Probability of staying in the chaotic zone. Source: Eq:ps at nu_min."""
-        return self.cycle.ctx.exp(-self.root.absorbed)
+        return self.binary.exp(-self.root.absorbed)
 
     @property
     def is_single(self) -> bool:
@@ -134,7 +142,7 @@ class Captures:
     @cached_property
     def placed(self) -> tuple[Placed, ...]:
         """All panels, a well's own before its children's."""
-        zero = self.cycle.ctx.zero
+        zero = self.binary.zero
         return tuple(_placed(self.root, zero, zero, zero))
 
     @cached_property
@@ -144,52 +152,52 @@ class Captures:
 
     def mean(self, f: Callable[[Any], Any]) -> Any:
         """Return the mean of f(log E1 / E0) over all particles, the uncaptured ones included."""
-        return self.cycle.ctx.fsum(w * f(s) for w, s in self.point_masses)
+        return self.binary.fsum([w * f(s) for w, s in self.point_masses])
 
     def growth(self) -> Any:
         """Return m1, the integral of g - 1 - log g over all captures. Source: Eq:Erate."""
-        ctx, total = self.cycle.ctx, self.cycle.ctx.zero
+        binary, total = self.binary, self.binary.zero
         for panel in (placed.panel for placed in self.placed):
-            density = [rate * ctx.exp(-a) for rate, a in zip(panel.rate, panel.A, strict=True)]
-            gain = [ctx.expm1(log_g) - log_g for log_g in panel.log_g]
+            density = [rate * binary.exp(-a) for rate, a in zip(panel.rate, panel.A, strict=True)]
+            gain = [binary.expm1(log_g) - log_g for log_g in panel.log_g]
             total += self.grid(panel).integral([y * p for y, p in zip(gain, density, strict=True)])
         return total
 
     def taylor(self, q: Any, order: int) -> list[Any]:
         """Return the coefficients, up to `order`, of mean exp((q + x) s) in powers of x."""
-        return self._taylor(self.root, self.cycle.ctx.mpf(q), order)
+        return self._taylor(self.root, self.binary.mpf(q), order)
 
     def captured(self, well: SolvedWell) -> WeightedPoints:
         """Return the particles captured on a well's own panels, from its top: d p_ell = exp(-A) dA."""
-        ctx, gain = self.cycle.ctx, well.B_top - well.A_top
+        exp, gain = self.binary.exp, well.B_top - well.A_top
         return [
-            (weight * rate * ctx.exp(well.A_top - a), s - gain)
+            (weight * rate * exp(well.A_top - a), s - gain)
             for panel in well.panels
             for weight, rate, a, s in zip(self.grid(panel).weights, panel.rate, panel.A, panel.s, strict=True)
         ]
 
     def _point_masses(self, well: SolvedWell) -> WeightedPoints:
-        ctx = self.cycle.ctx
-        below: WeightedPoints = [(ctx.one, ctx.zero)]
+        binary = self.binary
+        below: WeightedPoints = [(binary.one, binary.zero)]
         if well.children:
-            grid = Grid(ctx, 2 * (6 + self.target // 3))
+            grid = Grid(binary, 2 * (6 + self.target // 3))
             below = reduce(lambda x, y: convolve(grid, x, y), map(self._point_masses, well.children))
         spent = well.A_end - well.A_top
-        passed = shifted(below, ctx.exp(-spent), (well.B_end - well.B_top) - spent)
+        passed = shifted(below, binary.exp(-spent), (well.B_end - well.B_top) - spent)
         return self.captured(well) + passed
 
     def _taylor(self, well: SolvedWell, q: Any, order: int) -> list[Any]:
-        ctx, spent = self.cycle.ctx, well.A_end - well.A_top
-        passed = _exponential(ctx, ctx.exp(-spent), (well.B_end - well.B_top) - spent, q, order)
+        binary, spent = self.binary, well.A_end - well.A_top
+        passed = _exponential(binary, binary.exp(-spent), (well.B_end - well.B_top) - spent, q, order)
         for child in well.children:
             passed = product(passed, self._taylor(child, q, order))
-        terms = [_exponential(ctx, w, s, q, order) for w, s in self.captured(well)]
-        return [ctx.fsum(column) for column in zip(passed, *terms, strict=True)]
+        terms = [_exponential(binary, w, s, q, order) for w, s in self.captured(well)]
+        return [binary.fsum(column) for column in zip(passed, *terms, strict=True)]
 
 
-def _exponential(ctx: Any, weight: Any, s: Any, q: Any, order: int) -> list[Any]:
+def _exponential(binary: Binary, weight: Any, s: Any, q: Any, order: int) -> list[Any]:
     """Return the coefficients of weight exp((q + x) s) in powers of x."""
-    terms = [weight * ctx.exp(q * s)]
+    terms = [weight * binary.exp(q * s)]
     for k in range(1, order + 1):
         terms.append(terms[-1] * s / k)
     return terms
@@ -238,19 +246,20 @@ def captures(cycle: Cycle, target: int, on_progress: Callable[[float], None] | N
     if cycle.nu_min < NARROWEST * cycle.nu_max:
         share = cycle.ctx.nstr(cycle.nu_min / cycle.nu_max, 3)
         raise NotConverged(f"the mouth closes to {share} of its widest, must stay above {NARROWEST:g} of it")
-    grids = grids_for(cycle.ctx, target)
-    start = cycle.ctx.zero, cycle.ctx.zero
-    headway = Headway(len(cycle.pieces), on_progress)
-    root = _solved_well(cycle, list(grids.values()), cycle.well, start, target, headway)
+    binary, headway = cycle.binary, Headway(len(cycle.pieces), on_progress)
+    with binary.working():
+        grids = grids_for(binary, target)
+        start = binary.zero, binary.zero
+        root = _solved_well(cycle, list(grids.values()), cycle.well, start, target, headway)
     return Captures(cycle, grids, target, root)
 
 
-def grids_for(ctx: Any, target: int) -> dict[int, Grid]:
+def grids_for(binary: Binary, target: int) -> dict[int, Grid]:
     """Return the grids, by degree from low to high, of which each has every other point of the next."""
     degrees = [even_degree(2 * (12 + target))]
     while (n := degrees[0] // 2) % 2 == 0 and n >= FEWEST:
         degrees.insert(0, n)
-    return {n: Grid(ctx, n) for n in degrees}
+    return {n: Grid(binary, n) for n in degrees}
 
 
 def _solved_well(
@@ -274,18 +283,18 @@ def _resolved(
     headway: Headway,
 ) -> list[Panel]:
     panels: list[Panel] = []
-    most = most_halvings(cycle)
+    descent, most = Descent(cycle.binary, piece), most_halvings(cycle)
     todo = [(0, 0)]  # part i of the piece's 2^halvings equal parts in u
     while todo:
         i, halvings = todo.pop()
-        panel = _panel(cycle, grids, piece, (i, halvings), start, target, headway)
+        panel = _panel(cycle, grids, descent, (i, halvings), start, target, headway)
         if panel is not None:
             panels.append(panel)
             start = panel.A[-1], panel.B[-1]
         elif halvings < most:
             todo += [(2 * i + 1, halvings + 1), (2 * i, halvings + 1)]
         else:
-            nu, _ = _descent(piece, cycle.ctx.ldexp(i, -halvings))
+            nu, _ = descent.at(i * 0.5**halvings)
             raise NotConverged(
                 f"the cycle is not resolved to {target} digits near nu = {float(nu):.6g}"
                 f" by panels of 2^-{most} of a piece"
@@ -299,50 +308,70 @@ def most_halvings(cycle: Cycle) -> int:
 
     Singularities on a branch lie at the values of nu at its knots and critical points. Values that differ by
     more than `theory.cycle.tolerance` are ends of pieces; what differs by less is one value. So a
-    singularity is an end of the piece, where its orders take it away, or further off the end than the
-    tolerance: a part as short as that is resolved, and so is any other that is shorter than its distance.
-    Binary64 laws come so near: a leg from 0.9 to 0.1 has its middle 3e-17 off a knot at 0.5. What lies
-    beside the real line may be nearer still, and is given up.
+    singularity is an end of the piece, or further off the end than the tolerance. Its orders, and its `top`
+    and `bottom`, take away the nearest one at each end. A part as short as the tolerance is resolved whatever
+    else is near, and so is any other that is shorter than its distance. What lies beside the real line may be
+    nearer still, and is given up.
     """
     return min(MAX_HALVINGS, int((cycle.ctx.dps - 10) * log2(10)))
 
 
-class CapturePoint(NamedTuple):
-    """What a panel is made of at a point: a, b are dA / dx and dB / dx, x in [0, 1]."""
+class Descent:
+    """A piece as functions of x on [0, 1], along which nu falls.
 
-    nu: Any
-    t_in: Any
-    t_out: Any
-    a: Any
-    b: Any
-    log_g: Any
+    The polynomial I(u) takes nu from the piece's `top` to its `bottom`. Where these lie beyond its ends, the
+    piece takes only a part of u.
+    """
 
+    def __init__(self, binary: Binary, piece: CapturePiece) -> None:
+        self.binary, self.piece = binary, piece.changed(binary.taken)
+        (self._top, p), (bottom, q) = self.piece.top, self.piece.bottom
+        self._drop, self._orders, m = self._top - bottom, (p, q), p + q - 1
+        self._powers = [(j, m - j, comb(m, j)) for j in range(p, m + 1)]
+        self._start, stop = self._place(self.piece.nu_upper), self._place(self.piece.nu_lower)
+        self._length = stop - self._start
 
-def _sampled(ctx: Any, piece: CapturePiece, places: list[Any], width: Any) -> list[CapturePoint]:
-    """Sample a piece at places u, of which x takes the share `width`."""
-    binary = piece.capture.motion.binary
-    with binary.working():
-        piece, width = piece.changed(binary.taken), binary.taken(width)
-        samples = [_sample(binary, piece, binary.taken(u), width) for u in places]
-        return [CapturePoint._make(map(binary.given, sample)) for sample in samples]
+    def at(self, x: Any) -> tuple[Any, Any]:
+        """Return nu and d nu / dx."""
+        share, slope = self._share(self._start + x * self._length)
+        # Rounding of an end would cost half the digits of the time at which nu turns.
+        ends = {0: self.piece.nu_upper, 1: self.piece.nu_lower}
+        return ends.get(x, self._top - self._drop * share), -self._drop * slope * self._length
 
+    def point(self, x: Any, width: Any) -> tuple[Any, ...]:
+        """Return nu, t_in, t_out, dA / dy, dB / dy and log g at x, y from 0 to 1 over a part of x so wide."""
+        binary, (nu, slope) = self.binary, self.at(x)
+        root = binary.sqrt((1 - nu) * (1 + nu))
+        free = 2 * (binary.asin(nu) + nu * root) / binary.pi
+        stretches = self.piece.capture, self.piece.release
+        t_in, t_out = (stretch.in_binary(nu) for stretch in stretches)
+        shares = (s.motion.stem_share(t, nu) for s, t in zip(stretches, (t_in, t_out), strict=True))
+        a, b = (1 / (free + share) for share in shares)  # V_cap / V_cha
+        d_delta = -4 * root / binary.pi * slope * width
+        return nu, t_in, t_out, a * d_delta, b * d_delta, binary.log(b / a)
 
-def _sample(binary: Binary, piece: CapturePiece, u: Any, width: Any) -> CapturePoint:
-    nu, slope = _descent(piece, u)
-    root = binary.sqrt((1 - nu) * (1 + nu))
-    free = 2 * (binary.asin(nu) + nu * root) / binary.pi
-    stretches = piece.capture, piece.release
-    t_in, t_out = (stretch.in_binary(nu) for stretch in stretches)
-    # V_cap / V_cha
-    a, b = (1 / (free + s.motion.stem_share(t, nu)) for s, t in zip(stretches, (t_in, t_out), strict=True))
-    d_delta = -4 * root / binary.pi * slope * width
-    return CapturePoint(nu, t_in, t_out, a * d_delta, b * d_delta, binary.log(b / a))
+    def _share(self, u: Any) -> tuple[Any, Any]:
+        """Return I(u), the regularised incomplete beta function with integers p, q >= 1, and dI / du."""
+        (p, q), v = self._orders, 1 - u
+        share = sum(number * u**j * v**k for j, k, number in self._powers)
+        return share, p * comb(p + q - 1, p) * u ** (p - 1) * v ** (q - 1)
+
+    def _place(self, nu: Any) -> Any:
+        wanted, one = (self._top - nu) / self._drop, self.binary.one
+        if wanted in (0, 1):
+            return wanted
+
+        def rising(u: Any) -> tuple[Any, Any]:
+            share, slope = self._share(u)
+            return share - wanted, slope
+
+        return solve_rising(self.binary, rising, self.binary.zero, one)
 
 
 def _panel(
     cycle: Cycle,
     grids: list[Grid],
-    piece: CapturePiece,
+    descent: Descent,
     part: tuple[int, int],
     start: tuple[Any, Any],
     target: int,
@@ -354,14 +383,14 @@ def _panel(
     fall geometrically, or more slowly near a singularity: were that wrong, the part would only be halved once
     more than needed.
     """
-    ctx, width, n = cycle.ctx, cycle.ctx.ldexp(1, -part[1]), grids[-1].n
-    swing = free_share(ctx, cycle.nu_max) - free_share(ctx, cycle.nu_min)
-    known: dict[int, CapturePoint] = {}
+    ctx, width, n = cycle.ctx, cycle.binary.ldexp(cycle.binary.one, -part[1]), grids[-1].n
+    swing = cycle.binary.taken(free_share(ctx, cycle.nu_max) - free_share(ctx, cycle.nu_min))
+    known: dict[int, tuple[Any, ...]] = {}
     for grid in grids:
         places = range(0, n + 1, n // grid.n)
         headway.at((part[0] + len(known) / (n + 2)) * 0.5 ** part[1])
         new = [k for k in places if k not in known]
-        samples = _sampled(ctx, piece, [(part[0] + grids[-1].points[k]) * width for k in new], width)
+        samples = [descent.point((part[0] + grids[-1].points[k]) * width, width) for k in new]
         known.update(zip(new, samples, strict=True))
         nu, t_in, t_out, dA, dB, log_g = (
             list(column) for column in zip(*map(known.get, places), strict=True)
@@ -370,23 +399,10 @@ def _panel(
         # Of a narrow mouth a and b are large, and A and B in proportion.
         tail = max(_tail(c_g), *(_tail(c) / max(swing, *map(abs, c)) for c in (c_A, c_B)))
         share = 1 if grid.n == n else PROMISE * grid.n / n
-        if tail > ctx.mpf(10) ** (-target * share):
+        if tail > cycle.binary.mpf(10) ** (-target * share):
             return None
     A, B = ([at + rise for rise in grid.running_integral(c)] for at, c in zip(start, (c_A, c_B), strict=True))
     return Panel(nu, t_in, t_out, dA, log_g, A, B)
-
-
-def _descent(piece: CapturePiece, u: Any) -> tuple[Any, Any]:
-    """Return nu and d nu / du at u in [0, 1], nu falling along I(u).
-
-    I is the regularised incomplete beta function with integer parameters p, q >= 1.
-    """
-    p, q, v = piece.upper_order, piece.lower_order, 1 - u
-    m, drop = p + q - 1, piece.nu_upper - piece.nu_lower
-    share = sum(comb(m, j) * u**j * v ** (m - j) for j in range(p, m + 1))
-    slope = -drop * p * comb(m, p) * u ** (p - 1) * v ** (q - 1)
-    # The end itself is nu_lower: rounding there would cost half the digits of the vertex's time.
-    return (piece.nu_upper - drop * share if v else piece.nu_lower), slope
 
 
 def _tail(coefficients: list[Any]) -> Any:

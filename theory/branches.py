@@ -182,7 +182,8 @@ def tree(scene: Scene) -> Node:
 def _solved(scene: Scene) -> Node:
     # Every curve and histogram of a scene asks for its tree again. Its arrays are shared, hence read only.
     found = solved(scene, Cycle.of(scene, DIGITS), TARGET)
-    return _node(found, found.root, iter([_branch(found, k) for k in range(len(found.placed))]))
+    with found.binary.working():
+        return _node(found, found.root, iter([_branch(found, k) for k in range(len(found.placed))]))
 
 
 def _branch(found: Captures, k: int) -> Branch:
@@ -206,14 +207,14 @@ def _node(found: Captures, well: SolvedWell, branches: Iterator[Branch]) -> Node
     own = tuple(next(branches) for _ in well.panels)
     points = [[float(w), float(s)] for w, s in found.captured(well)]
     weights, s = _kept(points).T if points else (np.empty(0), np.empty(0))
-    spent, ctx = well.A_end - well.A_top, found.cycle.ctx
+    spent, exp = well.A_end - well.A_top, found.binary.exp
     return Node(
         weights,
         s,
         own,
         tuple(_node(found, child, branches) for child in well.children),
-        float(ctx.exp(-well.A_top)),
-        float(ctx.exp(-spent)),
+        float(exp(-well.A_top)),
+        float(exp(-spent)),
         float(well.B_end - well.B_top - spent),
         float(well.s_nc),
     )

@@ -4,9 +4,9 @@ Functions live on [0, 1], sampled at the n + 1 points (1 - cos(pi j / n)) / 2. W
 around the interval converges geometrically in n (Clenshaw and Curtis, 1960). Endpoint
 singularities are the caller's to remove.
 
-From FEW points on, sums of cosines are taken by halving (Lee, 1984): those at even k are sums of cosines over
-half the points, those at odd k two more such sums; n log n products in place of n^2. `even_degree` rounds a
-degree up to one that halves well.
+Sums of cosines are taken by halving (Lee, 1984): those at even k are sums of cosines over half the points,
+those at odd k two more such sums; n log n products in place of n^2. `even_degree` rounds a degree up to one
+that halves well.
 
 Distributions are weighted points, truncated power series lists of coefficients. The mean of a function over a
 sum of two independent variables needs all pairs of their points. To keep the number of points small the pairs
@@ -16,17 +16,11 @@ the same mean, so means of analytic functions converge geometrically; some of th
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import lru_cache
 from itertools import pairwise
 from operator import mul
 from typing import Any
 
-from mpmath import MPContext
-from mpmath.libmp import from_man_exp
-
-FEW = 200  # degree from which sums are taken by halving
-LEAST = 32  # degree below which they are taken one by one
+LEAST = 16  # degree up to which sums are taken one by one
 
 
 class Grid:
@@ -41,17 +35,12 @@ class Grid:
     def __init__(self, ctx: Any, n: int) -> None:
         self.ctx = ctx
         self.n = n
-        half = [*map(ctx.make_mpf, _cosines(n, ctx.prec)), ctx.zero]
+        half = [*(ctx.cos(ctx.pi * m / n) for m in range(n // 2)), ctx.zero]
         quarter_turns = half + [-c for c in reversed(half[:-1])]  # cos(pi m / n), m = 0 ... n
         self._full_turn = quarter_turns + quarter_turns[-2:0:-1]
-        self._whole_turn, self._exponent = _aligned(self._full_turn)
         self.points = [(1 - c) / 2 for c in quarter_turns]
         self._rows: dict[int, list[list[Any]]] = {}
         self.weights = self._clenshaw_curtis()
-
-    def _cosine_sums(self, values: list[Any]) -> list[Any]:
-        """Return the sums over j of values[j] cos(pi j k / n), k = 0 ... n."""
-        return self._sums_of_all(values) if self.n < FEW else self._sums_by_halving(values)
 
     def _sums_of_all(self, values: list[Any]) -> list[Any]:
         # cos(pi (n - j) k / n) = (-1)^k cos(pi j k / n): the second half of the sums repeats the first.
@@ -59,30 +48,24 @@ class Grid:
         even, odd = _folded(values)
         step = self.n // n
         if n not in self._rows:
-            turn = self._whole_turn
+            turn = self._full_turn
             self._rows[n] = [
                 [turn[j * k * step % (2 * self.n)] for j in range(n // 2 + 1)] for k in range(n + 1)
             ]
-        dot_even, dot_odd = self._products(even), self._products(odd)
-        return [(dot_odd if k % 2 else dot_even)(row) for k, row in enumerate(self._rows[n])]
+        return [self._product(odd if k % 2 else even, row) for k, row in enumerate(self._rows[n])]
 
-    def _products(self, values: list[Any]) -> Callable[[list[Any]], Any]:
-        """Return a function from whole cosines, or the first of them, to their sum with values as weights."""
-        if not all(map(self.ctx.isfinite, values)):
-            return lambda _row: self.ctx.nan  # whole numbers know no infinity
-        whole, exponent = _aligned(values)
-        exponent += self._exponent
-        prec, rounding = self.ctx._prec_rounding
-        make = self.ctx.make_mpf
-        return lambda row: make(from_man_exp(sum(map(mul, whole, row)), exponent, prec, rounding))
+    def _product(self, values: list[Any], row: list[Any]) -> Any:
+        """Return the sum of products with the first numbers of a row."""
+        return self.ctx.fsum(map(mul, values, row))
 
-    def _sums_by_halving(self, values: list[Any]) -> list[Any]:
+    def _cosine_sums(self, values: list[Any]) -> list[Any]:
+        """Return the sums over j of values[j] cos(pi j k / n), k = 0 ... n."""
         n = len(values) - 1
         if n % 4 or n <= LEAST:
             return self._sums_of_all(values)
         even, odd = _folded(values)
         found = [self.ctx.zero] * (n + 1)
-        found[::2], found[1::2] = self._sums_by_halving(even), self._odd_sums(odd)
+        found[::2], found[1::2] = self._cosine_sums(even), self._odd_sums(odd)
         return found
 
     def _odd_sums(self, values: list[Any]) -> list[Any]:
@@ -94,12 +77,10 @@ class Grid:
             key = -size
             if key not in self._rows:
                 half = step // 2
-                whole = self._whole_turn
                 self._rows[key] = [
-                    [whole[j * (2 * k + 1) * half % around] for j in range(size)] for k in range(size)
+                    [turn[j * (2 * k + 1) * half % around] for j in range(size)] for k in range(size)
                 ]
-            dot = self._products(values)
-            return [dot(row) for row in self._rows[key]]
+            return [self._product(values, row) for row in self._rows[key]]
         own = self._odd_sums(values[::2])
         odd = values[1::2]
         pairs = self._odd_sums([odd[0], *(a + b for a, b in pairwise(odd))])
@@ -124,7 +105,7 @@ class Grid:
 
     def integral(self, values: list[Any]) -> Any:
         """Return the integral over [0, 1] of the function with these values at the points."""
-        return self.ctx.fdot(self.weights, values)
+        return self._product(values, self.weights)
 
     def quadrature(self, moments: list[Any]) -> list[Any]:
         """Return the weights at the points of a measure with these means of T_k(2 x - 1), k = 0 ... n."""
@@ -137,31 +118,13 @@ class Grid:
 
     def _clenshaw_curtis(self) -> list[Any]:
         n, ctx = self.n, self.ctx
-        even = [ctx.mpf(1) / (1 - k * k) if k % 2 == 0 else ctx.zero for k in range(n + 1)]
+        even = [ctx.one / (1 - k * k) if k % 2 == 0 else ctx.zero for k in range(n + 1)]
         return self._interpolated(even)
 
 
-def _aligned(values: list[Any]) -> tuple[list[Any], int]:
-    """Return numbers as whole multiples of one power of two, exactly, and its exponent."""
-    raw = [value._mpf_ for value in values]
-    least = min((exponent for _, mantissa, exponent, _ in raw if mantissa), default=0)
-    return [
-        (-mantissa if sign else mantissa) << (exponent - least) if mantissa else 0
-        for sign, mantissa, exponent, _ in raw
-    ], least
-
-
-@lru_cache(maxsize=64)
-def _cosines(n: int, prec: int) -> tuple[Any, ...]:
-    """Return cos(pi m / n), m = 0 ... n / 2 - 1, as numbers that belong to no context; cycles share them."""
-    ctx = MPContext()
-    ctx.prec = prec
-    return tuple(ctx.cos(ctx.pi * m / n)._mpf_ for m in range(n // 2))
-
-
 def even_degree(n: int) -> int:
-    """Return a degree of at least n that halves at least twice, and a large one down to some LEAST."""
-    unit = 1 << max((n // LEAST).bit_length(), 3)
+    """Return a degree of at least n that halves at least twice, and a large one down to 2 LEAST."""
+    unit = 1 << max((n // (2 * LEAST)).bit_length(), 3)
     return -(-n // unit) * unit
 
 
@@ -201,10 +164,10 @@ def compressed(grid: Grid, masses: WeightedPoints) -> WeightedPoints:
     weights = [w for w, _ in masses]
     x = [2 * (s - low) / (high - low) - 1 for _, s in masses]
     older, old = [ctx.one] * len(x), x
-    moments = [ctx.fsum(weights), ctx.fdot(weights, x)]
+    moments = [ctx.fsum(weights), ctx.fsum(map(mul, weights, x))]
     for _ in range(2, grid.n + 1):
         older, old = old, [2 * y * now - before for y, now, before in zip(x, old, older, strict=True)]
-        moments.append(ctx.fdot(weights, old))
+        moments.append(ctx.fsum(map(mul, weights, old)))
     places = [low + (high - low) * p for p in grid.points]
     return list(zip(grid.quadrature(moments), places, strict=True))
 

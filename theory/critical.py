@@ -30,7 +30,8 @@ MANY_BITS = 512  # beyond which Newton's method begins with fewer
 class Span(NamedTuple):
     """A time interval on which nu is monotone and every law is analytic.
 
-    Near its ends nu departs from its value there as |t - end|^order.
+    Near its ends nu departs from its value there as |t - end|^order. `critical` are times, beyond its ends
+    too, at which nu would turn if its laws went on there as they are in the interval.
     """
 
     start: Any
@@ -38,6 +39,7 @@ class Span(NamedTuple):
     start_order: int
     end_order: int
     inside: Fraction
+    critical: tuple[Any, ...]
 
 
 class CriticalRoot(NamedTuple):
@@ -70,20 +72,22 @@ def spans(ctx: Any, scene: Mushroom) -> list[Span]:
         )
     if kinds == {BangBang}:
         return list(_bang_bang_spans(ctx, legs, width, radius))
-    found = _fourier_spans(ctx, scene, width, radius)
-    return _cut(ctx, found, [a for a, _ in leg_intervals(legs)], scene) if legs else found
+    shared = period(scene)
+    assert shared is not None
+    found = _fourier_spans(ctx, shared.value(ctx), width, radius)
+    if not legs:
+        return found
+    assert shared.length is not None
+    return _cut(ctx, found, [a % shared.length for a, _ in leg_intervals(legs)], shared.length)
 
 
-def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], scene: Mushroom) -> list[Span]:
+def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], whole: Fraction) -> list[Span]:
     """Cut spans of a Fourier mouth where bang-bang laws of radius, depth or slope are not analytic.
 
     The ends of the spans are rounded to the context's precision; a cut that lies nearer to an end than that
     rounding is taken for the end itself.
     """
-    shared = period(scene)
-    assert shared is not None
-    assert shared.length is not None
-    length = shared.value(ctx)
+    length = number(ctx, whole)
     near = ctx.ldexp(length, 16 - ctx.prec)
     pieces = []
     for span in found:
@@ -91,12 +95,13 @@ def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], scene: Mushroom) -> 
         first, last = (floor(t / length) for t in (span.start, span.end))
         for turn in range(first - 1, last + 2):
             for cut in cuts:
-                time = number(ctx, cut % shared.length + turn * shared.length)
+                time = number(ctx, cut + turn * whole)
                 if span.start + near < time < span.end - near:
                     times.append((time, 1))
         times = [*sorted(times), (span.end, span.end_order)]
         for (a, m), (b, n) in pairwise(times):
-            pieces.append(Span(a, b, m, n, Fraction(*map(int, ((a + b) / 2).as_integer_ratio()))))
+            inside = Fraction(*map(int, ((a + b) / 2).as_integer_ratio()))
+            pieces.append(Span(a, b, m, n, inside, span.critical))
     return pieces
 
 
@@ -113,19 +118,18 @@ def _bang_bang_spans(ctx: Any, moving: list[BangBang], width: Law, radius: Law) 
             orders.append(1 + root.multiplicity)
         times.append(number(ctx, b))
         orders.append(1 + _multiplicity_at(slope, b - a))
+        powers = (number(ctx, c) for c in slope)  # cubes cancel in w' r - w r'
+        critical = tuple(times[0] + x for x in quadratic_roots(ctx, *powers))
         for i in range(len(times) - 1):
-            yield Span(times[i], times[i + 1], orders[i], orders[i + 1], (a + b) / 2)
+            yield Span(times[i], times[i + 1], orders[i], orders[i + 1], (a + b) / 2, critical)
 
 
-def _fourier_spans(ctx: Any, scene: Mushroom, width: Law, radius: Law) -> list[Span]:
+def _fourier_spans(ctx: Any, length: Any, width: Law, radius: Law) -> list[Span]:
     (w, n_w), (r, n_r) = half_angle(width), half_angle(radius)
     (dw, _), (dr, _) = half_angle(width, 1), half_angle(radius, 1)
     slope = exact.add(exact.multiply(dw, r), exact.scale(exact.multiply(w, dr), Fraction(-1)))
     if not slope:
         return []
-    shared = period(scene)
-    assert shared is not None
-    length = shared.value(ctx)
     found = [(ctx.zero + length / 2, 2 * (n_w + n_r) - (len(slope) - 1))]  # x = infinity
     bound = exact.root_bound(slope)
     for root in _roots(slope, -bound, bound):
@@ -133,7 +137,9 @@ def _fourier_spans(ctx: Any, scene: Mushroom, width: Law, radius: Law) -> list[S
         found.append((time if time >= 0 else time + length, root.multiplicity))
     found = sorted((t, m) for t, m in found if m > 0)
     later = [*found[1:], (found[0][0] + length, found[0][1])]
-    return [Span(a, b, 1 + m, 1 + n, Fraction(0)) for (a, m), (b, n) in zip(found, later, strict=True)]
+    return [
+        Span(a, b, 1 + m, 1 + n, Fraction(0), (a, b)) for (a, m), (b, n) in zip(found, later, strict=True)
+    ]
 
 
 def _multiplicity_at(p: exact.Polynomial, x: Fraction) -> int:
@@ -182,6 +188,13 @@ def _refined(ctx: Any, root: CriticalRoot) -> Any:
         return sign * value, sign * slope
 
     return solve_rising(ctx, rising, low, high)
+
+
+def quadratic_roots(ctx: Any, c: Any = 0, b: Any = 0, a: Any = 0) -> list[Any]:
+    """Return the roots of c + b x + a x^2; the real part of complex ones."""
+    root = ctx.sqrt(max(b * b - 4 * a * c, ctx.zero))
+    q = -(b + root if b > 0 else b - root) / 2
+    return [over / under for over, under in ((q, a), (c, q)) if under]
 
 
 def solve_rising(ctx: Any, f: Any, low: Any, high: Any, guess: Any = None) -> Any:

@@ -27,7 +27,7 @@ from scene.refusal import BadInput, check_count
 from scene.tables import Mushroom, Scene, period
 from theory.critical import Span, spans
 from theory.parameters import MovingMushroom
-from theory.precision import guarded, settle
+from theory.precision import Binary, guarded, settle
 from theory.validation import MAX_DIGITS, one_of
 from theory.volumes import NotCovered, as_mushroom
 
@@ -89,6 +89,11 @@ class Cycle:
         return cls(ctx, digits, run[0].upper, length, max(levels), min(levels), found)
 
     @property
+    def binary(self) -> Binary:
+        """Numbers in which the cycle is solved."""
+        return Binary(self.ctx)
+
+    @property
     def pieces(self) -> tuple[CapturePiece, ...]:
         """All pieces of the tree of wells."""
         return tuple(self.well.all_pieces())
@@ -140,7 +145,11 @@ class Cycle:
 
 
 class MonotoneStretch(NamedTuple):
-    """A part of a branch on which nu is strictly monotone: from `upper` at nu_upper to `lower`."""
+    """A part of a branch on which nu is strictly monotone: from `upper` at nu_upper to `lower`.
+
+    critical: values at which nu would turn if its laws went on beyond the ends. There the time is singular,
+        as a square root.
+    """
 
     motion: MovingMushroom
     upper: Any
@@ -149,6 +158,7 @@ class MonotoneStretch(NamedTuple):
     nu_lower: Any
     upper_order: int
     lower_order: int
+    critical: tuple[Any, ...]
 
     def time(self, nu: Any) -> Any:
         """Return the time at which nu(t) = nu, nu_lower <= nu <= nu_upper."""
@@ -167,8 +177,8 @@ class MonotoneStretch(NamedTuple):
 
     def changed(self, change: Callable[[Any], Any]) -> MonotoneStretch:
         """Return the stretch with its numbers in another form."""
-        upper, lower, nu_upper, nu_lower = map(change, self[1:5])
-        return self._replace(upper=upper, lower=lower, nu_upper=nu_upper, nu_lower=nu_lower)
+        numbers, critical = map(change, self[1:5]), tuple(map(change, self.critical))
+        return MonotoneStretch._make((self.motion, *numbers, self.upper_order, self.lower_order, critical))
 
     def between(self, nu_upper: Any, nu_lower: Any, tolerance: Any) -> MonotoneStretch:
         """Return the part between two values; a value within tolerance of an end is that end."""
@@ -201,15 +211,27 @@ class CapturePiece(NamedTuple):
         return self.capture.nu_lower
 
     @property
-    def upper_order(self) -> int:
-        """Order p that makes everything analytic in u near nu = nu_upper - const u^p."""
-        top = 2 if self.nu_upper == 1 else 1  # sqrt(1 - nu^2) in d delta
-        return lcm(top, self.capture.upper_order, self.release.upper_order)
+    def top(self) -> tuple[Any, int]:
+        """A value and an order p that make everything analytic in u, near nu = value - const u^p.
+
+        The value is nu_upper or, where nothing is singular there, the nearest beyond at which something is.
+        """
+        order = 2 if self.nu_upper == 1 else 1  # sqrt(1 - nu^2) in d delta
+        order = lcm(order, self.capture.upper_order, self.release.upper_order)
+        return self._end(self.nu_upper, self.nu_upper - self.nu_lower, order)
 
     @property
-    def lower_order(self) -> int:
+    def bottom(self) -> tuple[Any, int]:
         """The same near nu_lower."""
-        return lcm(self.capture.lower_order, self.release.lower_order)
+        order = lcm(self.capture.lower_order, self.release.lower_order)
+        return self._end(self.nu_lower, self.nu_lower - self.nu_upper, order)
+
+    def _end(self, nu: Any, outward: Any, order: int) -> tuple[Any, int]:
+        singular = (1, *self.capture.critical, *self.release.critical)
+        near = [value for value in singular if 0 < (value - nu) / outward < 1]
+        if order > 1 or not near:
+            return nu, order
+        return min(near, key=lambda value: abs(value - nu)), 2
 
 
 class NuWell(NamedTuple):
@@ -287,7 +309,10 @@ def _next_period(ctx: Any, scene: Mushroom, span: Span) -> Span:
     assert shared is not None
     length = shared.value(ctx)
     return span._replace(
-        start=span.start + length, end=span.end + length, inside=span.inside + (shared.length or Fraction(0))
+        start=span.start + length,
+        end=span.end + length,
+        inside=span.inside + (shared.length or Fraction(0)),
+        critical=tuple(t + length for t in span.critical),
     )
 
 
@@ -301,7 +326,8 @@ def _stretch(ctx: Any, scene: Mushroom, span: Span) -> MonotoneStretch:
         (motion.nu(span.end)[0], span.end, span.end_order),
     ]
     (nu_lower, lower, lower_order), (nu_upper, upper, upper_order) = sorted(ends)
-    return MonotoneStretch(motion, upper, lower, nu_upper, nu_lower, upper_order, lower_order)
+    critical = tuple(motion.nu(t)[0] for t in span.critical)
+    return MonotoneStretch(motion, upper, lower, nu_upper, nu_lower, upper_order, lower_order, critical)
 
 
 def _pieces(

@@ -25,6 +25,8 @@ from theory.prediction import converged
 from theory.validation import real_numbers
 from theory.volumes import NotCovered, delta_slope
 
+REACH = 2.0**-12  # of a panel, around a turning point that is known in binary64
+
 
 class Caustic(NamedTuple):
     """A turning point of s(t_in), where the density of s is infinite.
@@ -68,10 +70,10 @@ class _Panel:
     """One panel's s, A and times as series."""
 
     def __init__(self, found: Captures, placed: Placed) -> None:
-        self.ctx, grid = found.cycle.ctx, found.grid(placed.panel)
+        self.binary, grid = found.binary, found.grid(placed.panel)
 
         def series(values: list[Any]) -> ChebyshevSeries:
-            return ChebyshevSeries(self.ctx, grid.coefficients(values))
+            return ChebyshevSeries(self.binary, grid.coefficients(values))
 
         self.s, self.A, self.t_in = series(placed.s), series(placed.panel.A), series(placed.panel.t_in)
         self.ends = (placed.s[0], placed.s[-1])
@@ -81,17 +83,17 @@ class _Panel:
     def turns(self) -> list[Any]:
         """Return 0, the turning points of s, and 1."""
         rough = turns(np.array([float(c) for c in self.s.coefficients]))
-        found = [self.ctx.zero]
+        found = [self.binary.zero]
         for place in rough[1:-1]:
-            near = self.ctx.mpf(float(place))
+            near = self.binary.mpf(float(place))
             sign = 1 if self.s_bend(near) > 0 else -1
 
             def rising(x: Any, sign: int = sign) -> tuple[Any, Any]:
                 return sign * self.s_rate(x), sign * self.s_bend(x)
 
-            reach = self.ctx.mpf(2) ** -12
-            found.append(solve_rising(self.ctx, rising, max(near - reach, 0), min(near + reach, 1), near))
-        return [*found, self.ctx.one]
+            low, high = max(near - REACH, self.binary.zero), min(near + REACH, self.binary.one)
+            found.append(solve_rising(self.binary, rising, low, high, near))
+        return [*found, self.binary.one]
 
     def stretches(self) -> Iterator[tuple[Any, Any, Any, Any]]:
         """Yield monotone stretches: start, stop and s at each."""
@@ -106,26 +108,29 @@ class _Panel:
         def rising(x: Any) -> tuple[Any, Any]:
             return sign * (self.s(x) - s), sign * self.s_rate(x)
 
-        return solve_rising(self.ctx, rising, a, b)
+        return solve_rising(self.binary, rising, a, b)
 
     def flow(self, x: Any) -> Any:
         """Return the probability captured per unit of x."""
-        return self.ctx.exp(-self.A(x)) * self.A_rate(x)
+        return self.binary.exp(-self.A(x)) * self.A_rate(x)
 
 
 def _panels(found: Captures) -> list[_Panel]:
     if not found.is_single:
         raise NotCovered("densities are of cycles in which a particle is captured at most once")
-    ctx = found.cycle.ctx
-    size = max((abs(s) for placed in found.placed for s in placed.s), default=ctx.one)
-    if size < ctx.mpf(10) ** -found.target:
+    size = max((abs(s) for placed in found.placed for s in placed.s), default=1)
+    if size < _resolution(found):
         raise NotCovered("densities are of cycles in which energies change")
     return [_Panel(found, placed) for placed in found.placed]
 
 
 def _resolution(found: Captures) -> Any:
     """Return what s, resolved to so many decimals, may change by where it is constant."""
-    return found.cycle.ctx.mpf(10) ** -found.target
+    return found.binary.mpf(10) ** -found.target
+
+
+def _taken(found: Captures, field: str, values: Sequence[Any]) -> list[Any]:
+    return [found.binary.taken(value) for value in real_numbers(found.cycle.ctx, field, values)]
 
 
 @guarded
@@ -152,14 +157,15 @@ def density_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, .
         resolution = _resolution(found)
 
         def density(level: Any) -> Any:
-            total = found.cycle.ctx.zero
+            total = found.binary.zero
             for panel, (a, b, s_a, s_b) in stretches:
-                if abs(s_a - s_b) > resolution and min(s_a, s_b) < level < max(s_a, s_b):
+                # A level within rounding of an end is taken to lie beside it: the density jumps there.
+                if min(s_a, s_b) + resolution < level < max(s_a, s_b) - resolution:
                     x = panel.root(a, b, bool(s_a < s_b), level)
                     total += panel.flow(x) / abs(panel.s_rate(x))
             return total
 
-        return tuple(density(level) for level in real_numbers(found.cycle.ctx, "s", s))
+        return tuple(density(level) for level in _taken(found, "s", s))
 
     return converged(scene, digits, figures)
 
@@ -180,12 +186,12 @@ def cdf_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
     """
 
     def figures(found: Captures) -> tuple[Any, ...]:
-        ctx = found.cycle.ctx
+        binary = found.binary
         stretches = [(panel, row) for panel in _panels(found) for row in panel.stretches()]
         resolution = _resolution(found)
 
         def probability(level: Any) -> Any:
-            total = found.p_not_captured if found.s_not_captured - resolution <= level else ctx.zero
+            total = found.p_not_captured if found.s_not_captured - resolution <= level else binary.zero
             for panel, (a, b, s_a, s_b) in stretches:
                 is_point_mass = abs(s_a - s_b) <= resolution
                 if level < min(s_a, s_b) - (resolution if is_point_mass else 0):
@@ -194,10 +200,10 @@ def cdf_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
                 if level < max(s_a, s_b) and not is_point_mass:
                     x = panel.root(a, b, bool(s_a < s_b), level)
                     start, stop = (a, x) if s_a < s_b else (x, b)
-                total += ctx.exp(-panel.A(start)) - ctx.exp(-panel.A(stop))
+                total += binary.exp(-panel.A(start)) - binary.exp(-panel.A(stop))
             return total
 
-        return tuple(probability(level) for level in real_numbers(ctx, "s", s))
+        return tuple(probability(level) for level in _taken(found, "s", s))
 
     return converged(scene, digits, figures)
 
@@ -219,8 +225,8 @@ def caustics(scene: Scene, digits: int = 15) -> list[Caustic]:
         for panel in _panels(found):
             for x in panel.turns()[1:-1]:
                 bend = panel.s_bend(x)
-                strength = panel.flow(x) * found.cycle.ctx.sqrt(2 / abs(bend))
-                rows += [panel.t_in(x), panel.s(x), strength, found.cycle.ctx.sign(bend)]
+                strength = panel.flow(x) * found.binary.sqrt(2 / abs(bend))
+                rows += [panel.t_in(x), panel.s(x), strength, found.binary.one * found.binary.sign(bend)]
         return tuple(rows)
 
     flat = converged(scene, digits, figures)
@@ -251,21 +257,22 @@ def capture_rate_at(scene: Scene, t: Sequence[Any], digits: int = 15) -> tuple[A
 
 
 def _rate(found: Captures, time: Any) -> Any:
-    cycle, ctx = found.cycle, found.cycle.ctx
+    cycle, ctx, binary = found.cycle, found.cycle.ctx, found.binary
     if cycle.period is not None:
         time -= ctx.floor((time - cycle.start) / cycle.period) * cycle.period
     for piece in cycle.pieces:
         if piece.capture.upper <= time <= piece.capture.lower:
             nu, rate = piece.capture.motion.nu(time)
             now = piece.capture.motion.volumes(time, nu)
-            return ctx.exp(-_spent(found, time)) * now.v_cap / now.v_cha * delta_slope(ctx, nu) * rate
-    return ctx.zero
+            flux = now.v_cap / now.v_cha * delta_slope(ctx, nu) * rate
+            return binary.exp(-_spent(found, binary.taken(time))) * binary.taken(flux)
+    return binary.zero
 
 
 def _spent(found: Captures, time: Any) -> Any:
     """Return A at a time of capture."""
-    ctx = found.cycle.ctx
+    binary = found.binary
     panel = next(p.panel for p in found.placed if p.panel.t_in[0] <= time <= p.panel.t_in[-1])
-    t_in, A = (ChebyshevSeries(ctx, found.grid(panel).coefficients(v)) for v in (panel.t_in, panel.A))
+    t_in, A = (ChebyshevSeries(binary, found.grid(panel).coefficients(v)) for v in (panel.t_in, panel.A))
     rate = t_in.rate()
-    return A(solve_rising(ctx, lambda x: (t_in(x) - time, rate(x)), ctx.zero, ctx.one))
+    return A(solve_rising(binary, lambda x: (t_in(x) - time, rate(x)), binary.zero, binary.one))

@@ -52,17 +52,17 @@ def rarity(scene: Scene, digits: int = 15) -> Rarity:
 
 
 def _least(found: Captures) -> tuple[Any, ...]:
-    ctx = found.cycle.ctx
-    size = max((abs(s) for _, s in found.point_masses), default=ctx.zero)
-    if size < ctx.mpf(10) ** -found.target:
-        return ctx.zero, -ctx.one / 2
+    binary = found.binary
+    size = max((abs(s) for _, s in found.point_masses), default=binary.zero)
+    if size < binary.mpf(10) ** -found.target:
+        return binary.zero, -binary.one / 2
 
     def slope(q: Any) -> tuple[Any, Any]:
         p = found.taylor(q, 2)
         return p[1], 2 * p[2]
 
-    place = solve_rising(ctx, slope, -ctx.one, ctx.zero, -ctx.one / 2)
-    return -ctx.log(found.taylor(place, 0)[0]), place
+    place = solve_rising(binary, slope, -binary.one, binary.zero, -binary.one / 2)
+    return -binary.log(found.taylor(place, 0)[0]), place
 
 
 def loss_probability(found: Energies | Scene, n_cycles: int) -> float:

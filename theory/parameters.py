@@ -10,14 +10,17 @@ from __future__ import annotations
 import cmath
 from collections.abc import Callable
 from fractions import Fraction
+from itertools import zip_longest
 from typing import Any
 
 import gmpy2
 from mpmath import fp
 
-from scene.laws import Fourier, Piece, Quadratic, exact, frequency, piece_at
+from scene.exact import leg_polynomial
+from scene.laws import Fourier, Law, Piece, Quadratic, exact, frequency, piece_at
+from scene.mouth import mouth_factors
 from scene.tables import Mushroom, laws
-from theory.critical import solve_rising
+from theory.critical import quadratic_roots, solve_rising
 from theory.precision import Binary
 from theory.volumes import Volumes, volumes_of
 
@@ -45,8 +48,11 @@ class MovingMushroom:
             # Laws that move share one period.
             self._omega = frequency(self.binary, waves[0]) if waves else None
             self._parameters = {name: _parameter(self.binary, piece) for name, piece in pieces.items()}
-            near = _inverse_of_waves if self._is_wavy else _inverse_of_parabolas
-            self._near: Inverse = near(self.binary, *mouth)
+            self._near: Inverse = (
+                _inverse_of_waves(self.binary, *mouth)
+                if self._is_wavy
+                else _inverse_of_parabolas(self.binary, *mouth_factors(scene), time)
+            )
 
     def nu(self, t: Any) -> tuple[Any, Any]:
         """Return the mouth w / r at time t, and its rate. Source: Eq:nu, eq:dnu."""
@@ -127,30 +133,16 @@ def _wave(law: Fourier, omega: Any, number: Callable[[float, float], Any]) -> Pa
     return wave
 
 
-def _inverse_of_parabolas(binary: Binary, width: Piece, radius: Piece) -> Inverse:
-    """Invert w / r of parabolas or constants: a quadratic equation."""
-    origins = [piece.origin for piece in (width, radius) if isinstance(piece, Quadratic)]
-    origin = origins[0] if origins else Fraction(0)
-    powers = [_powers(binary, piece, origin) for piece in (width, radius)]
-    base = exact(binary, origin)
+def _inverse_of_parabolas(binary: Binary, width: Law, radius: Law, time: Fraction) -> Inverse:
+    """Invert w / r of the parabolas or constants that two laws are near a time: a quadratic equation."""
+    powers = [[exact(binary, c) for c in leg_polynomial(law, time)] for law in (width, radius)]
+    base = exact(binary, time)
 
     def inverse(nu: Any, low: Any, high: Any) -> Any:
-        c, b, a = (w - nu * r for w, r in zip(*powers, strict=True))
-        root = binary.sqrt(max(b * b - 4 * a * c, binary.zero))
-        q = -(b + root if b > 0 else b - root) / 2
-        found = [base + over / under for over, under in ((q, a), (c, q)) if under]
-        return next((t for t in found if low < t < high), None)
+        found = quadratic_roots(binary, *(w - nu * r for w, r in zip_longest(*powers, fillvalue=0)))
+        return next((base + x for x in found if low < base + x < high), None)
 
     return inverse
-
-
-def _powers(binary: Binary, piece: Piece, origin: Fraction) -> list[Any]:
-    """Return a parabola's coefficients of powers of the time since an origin."""
-    if not isinstance(piece, Quadratic):
-        return [binary.mpf(piece), binary.zero, binary.zero]
-    x = origin - piece.origin
-    rational = piece.c0 + x * (piece.c1 + x * piece.c2), piece.c1 + 2 * x * piece.c2, piece.c2
-    return [exact(binary, c) for c in rational]
 
 
 def _inverse_of_waves(binary: Binary, width: Piece, radius: Piece) -> Inverse:

@@ -10,8 +10,8 @@ not stopped; those that ask for fewer digits than theory has asked for change no
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
@@ -48,12 +48,17 @@ class Binary:
     What is computed with them is computed under `working`.
     """
 
-    mpf, sqrt, asin, log = gmpy2.mpfr, gmpy2.sqrt, gmpy2.asin, gmpy2.log
+    mpf, sqrt, exp, expm1, log = gmpy2.mpfr, gmpy2.sqrt, gmpy2.exp, gmpy2.expm1, gmpy2.log
+    cos, asin, sign, fsum = gmpy2.cos, gmpy2.asin, gmpy2.sign, gmpy2.fsum
+    zero, one = gmpy2.mpfr(0), gmpy2.mpfr(1)
 
     def __init__(self, ctx: Any) -> None:
         self.ctx = ctx
-        self.prec = int(ctx.prec) + SPARE_BITS
-        self.zero = gmpy2.mpfr(0)
+
+    @property
+    def prec(self) -> int:
+        """Return the present precision in bits."""
+        return int(gmpy2.get_context().precision)
 
     @property
     def pi(self) -> Any:
@@ -63,25 +68,20 @@ class Binary:
     @property
     def eps(self) -> Any:
         """Return the spacing of numbers near 1."""
-        return self.ldexp(gmpy2.mpfr(1), 1 - self.prec)
+        return self.ldexp(self.one, 1 - self.prec)
 
     def ldexp(self, x: Any, n: int) -> Any:
         """Return x 2^n."""
         return gmpy2.mul_2exp(x, n) if n >= 0 else gmpy2.div_2exp(x, -n)
 
-    @contextmanager
-    def workprec(self, prec: int) -> Iterator[None]:
+    def workprec(self, prec: int) -> AbstractContextManager[Any]:
         """Compute with so many bits."""
-        before, self.prec = self.prec, prec
-        with gmpy2.context(gmpy2.get_context(), precision=prec):
-            yield
-        self.prec = before
+        changed: AbstractContextManager[Any] = gmpy2.context(gmpy2.get_context(), precision=prec)
+        return changed
 
-    @contextmanager
-    def working(self) -> Iterator[None]:
+    def working(self) -> AbstractContextManager[Any]:
         """Compute as wide as the mpmath context is now."""
-        with self.workprec(int(self.ctx.prec) + SPARE_BITS):
-            yield
+        return self.workprec(int(self.ctx.prec) + SPARE_BITS)
 
     def taken(self, x: Any) -> Any:
         """Return a number of the mpmath context as one of these."""

@@ -4,15 +4,16 @@ Everything is computed at two or more resolutions; an answer is given when two i
 agree to two digits more than asked, and is then the finer of the two. A cycle in which one particle is
 captured several times is covered too.
 
-Solved cycles are kept for the next request: numbers alone, those of the last KEPT solutions to few digits.
-Each caller gets them in the number system of its own cycle: it may change that, or compute in another thread,
-and nobody else is touched.
+Solved cycles are kept for the next request, those of the last KEPT solutions to few digits. Their numbers
+belong to no number system, and each caller's figures to that of its own cycle: it may change that, or compute
+in another thread, and nobody else is touched.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache, partial
+from math import factorial
 from typing import Any, NamedTuple
 
 import msgspec
@@ -22,7 +23,7 @@ from scene.notebook import rows
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Mushroom, Scene, laws
 from scene.transforms import backwards
-from theory.adiabatic import Captures, NotConverged, Panel, SolvedWell, captures, grids_for
+from theory.adiabatic import Captures, NotConverged, SolvedWell, captures, grids_for
 from theory.chebyshev import logarithm
 from theory.cycle import GUARD, Cycle
 from theory.precision import guarded
@@ -113,10 +114,11 @@ def mean_of(scene: Scene, f: Callable[[Any], Any], digits: int = 15) -> Any:
     if not callable(f):
         raise BadInput(f"f = {shown(f)}, must be a function")
 
-    def value(s: Any) -> Any:
-        return one_of(s.context, "f(s)", f(s))
+    def figures(found: Captures) -> tuple[Any, ...]:
+        ctx, binary = found.cycle.ctx, found.binary
+        return (found.mean(lambda s: binary.taken(one_of(ctx, "f(s)", f(binary.given(s))))),)
 
-    return converged(scene, digits, lambda found: (found.mean(value),))[0]
+    return converged(scene, digits, figures)[0]
 
 
 @guarded
@@ -135,8 +137,7 @@ def moments(scene: Scene, order: int, digits: int = 15) -> tuple[Any, ...]:
     order = check_count("order", order, 0, MAX_ORDER)
 
     def figures(found: Captures) -> tuple[Any, ...]:
-        ctx = found.cycle.ctx
-        return tuple(c * ctx.factorial(k) for k, c in enumerate(found.taylor(0, order)))
+        return tuple(c * factorial(k) for k, c in enumerate(found.taylor(0, order)))
 
     return converged(scene, digits, figures)
 
@@ -160,8 +161,7 @@ def cumulants(scene: Scene, order: int, digits: int = 15, q: float = 0.0) -> tup
     """
     order, tilt = check_count("order", order, 0, MAX_ORDER), check_number("q", q)
     p = list(converged(scene, digits, lambda found: tuple(found.taylor(tilt, order))))
-    ctx = p[0].context
-    return tuple(c * ctx.factorial(k) for k, c in enumerate(logarithm(ctx, p)))
+    return tuple(c * factorial(k) for k, c in enumerate(logarithm(p[0].context, p)))
 
 
 def reversed_cycle(scene: Scene) -> Mushroom:
@@ -175,7 +175,6 @@ def reversed_cycle(scene: Scene) -> Mushroom:
 
 
 def _figures(found: Captures) -> tuple[Any, ...]:
-    ctx = found.cycle.ctx
     # Wells multiply in `taylor`; as weighted points, which `mean` takes, they would be convolved. As mean
     # exp(-s) is 1, the mean of s is of the order of its variance, and no more than rounding cancels.
     _, first, second = found.taylor(0, 2)
@@ -183,7 +182,7 @@ def _figures(found: Captures) -> tuple[Any, ...]:
         found.p_not_captured,
         found.growth(),
         found.s_not_captured,
-        ctx.sqrt(max(2 * second - first**2, ctx.zero)),
+        found.binary.sqrt(max(2 * second - first**2, found.binary.zero)),
         found.taylor(-1, 0)[0],
         found.taylor(1, 0)[0],
     )
@@ -202,25 +201,21 @@ def converged(
     """
     digits = check_count("digits", digits, 1, MAX_DIGITS)
     cycle = Cycle.of(scene, digits)
-    ctx = cycle.ctx
+    ctx, binary = cycle.ctx, cycle.binary
     noise, agreement = ctx.mpf(10) ** -(digits + GUARD - 10), ctx.mpf(10) ** -(digits + 2)
     previous: tuple[Any, ...] | None = None
     for number, target in enumerate(range(digits + 4, digits + GUARD - 8, 12), 1):
         on_progress = None if progress is None else partial(progress, number)
         found = solved(scene, cycle, target, on_progress)
-        current = tuple(ctx.zero if abs(x) < noise else x for x in figures(found))
+        with binary.working():
+            current = tuple(binary.given(x) for x in figures(found))
+        current = tuple(ctx.zero if abs(x) < noise else x for x in current)
         if previous is not None and len(current) == len(previous):
             changes = (abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True))
             if all(changes):
                 return current
         previous = current
     raise NotConverged(f"two resolutions in a row do not agree to {digits} digits")
-
-
-class _Solution:
-    """A place for the numbers of one solution."""
-
-    well: SolvedWell | None = None
 
 
 def solved(
@@ -240,22 +235,15 @@ def solved(
     if cycle.digits > FEW_DIGITS:
         return captures(cycle, target, on_progress)
     place = _place(tuple(laws(scene).items()), cycle.digits, target)
-    if place.well is None:
-        found = captures(cycle, target, on_progress)
-        place.well = _moved(found.root, lambda number: number._mpf_)
-        return found
-    if on_progress is not None:
+    if not place:
+        place.append(captures(cycle, target, on_progress).root)
+    elif on_progress is not None:
         on_progress(1.0)
-    return Captures(cycle, grids_for(cycle.ctx, target), target, _moved(place.well, cycle.ctx.make_mpf))
+    with cycle.binary.working():
+        return Captures(cycle, grids_for(cycle.binary, target), target, place[0])
 
 
 @lru_cache(maxsize=KEPT)
-def _place(given: tuple[tuple[str, Law], ...], digits: int, target: int) -> _Solution:
-    return _Solution()
-
-
-def _moved(well: SolvedWell, change: Callable[[Any], Any]) -> SolvedWell:
-    """Return the same numbers in another form."""
-    panels = (Panel(*([change(number) for number in column] for column in panel)) for panel in well.panels)
-    children = (_moved(child, change) for child in well.children)
-    return SolvedWell(tuple(panels), tuple(children), *map(change, well[2:]))
+def _place(given: tuple[tuple[str, Law], ...], digits: int, target: int) -> list[SolvedWell]:
+    """Return the place of a solution: a list, empty at first."""
+    return []

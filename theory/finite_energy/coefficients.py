@@ -109,7 +109,7 @@ class Fields:
     Attributes, of the uncaptured, weighted by diffusion:
         forgotten: share of the variance without `shear` that it takes off.
         depleted: share of diffusion that depletion takes off.
-        turned: mean square of what walls turn velocities by in a `crossing`.
+        turned: share of the variance that walls take off by turning velocities within a `crossing`.
         is_known: whether their speeds are among those for which rates were measured.
         n_blocks: of path, each twice as long as the memory, in a cycle.
     """
@@ -126,7 +126,10 @@ class Fields:
         diffusion = np.maximum(left, 0.0)[None] * rates.diffusion.T[:, None]
         # What kicks remember is a direction: walls that turn it the other way kick with the other sign.
         kicks, turning = np.sign(cycle.shear) * np.sqrt(diffusion / speed), np.abs(cycle.shear)
-        spread = self._remembered(kicks, speed, turning).sum(axis=0)
+        remembered = self._remembered(kicks, speed, turning).sum(axis=0)
+        # Of 1 - x only the first order is known: 1 / (1 + x) has it, and stays positive.
+        turned = (remembered * (turning * cycle.crossing / speed) ** 2).sum(axis=1) / remembered.sum(axis=1)
+        spread = remembered / (1 + turned)[:, None]
         slower = np.exp(-GAINS[:, None] / 2)
         self._values = {
             "lag": lag,
@@ -142,9 +145,9 @@ class Fields:
         share = spread[uncaptured] / spread[uncaptured].sum()
         memory = rates.diffusion @ np.array(MEMORIES) / rates.diffusion.sum(axis=1)
         steady = self._remembered(kicks, speed, np.zeros(N_TIMES))[:, uncaptured]
-        self.forgotten = 1 - float(spread[uncaptured].sum() / steady.sum())
         self.depleted = 1 - float(share @ left[uncaptured])
-        self.turned = float(share @ (turning * cycle.crossing / speed[uncaptured]) ** 2)
+        self.turned = 1 - float(1 / (1 + turned[uncaptured]))
+        self.forgotten = 1 - float(remembered[uncaptured].sum() / steady.sum())
         self.is_known = bool(speed[uncaptured].min() >= SPEEDS[0])
         self.n_blocks = float(speed[uncaptured].sum() * self._step / (2 * (share @ memory)))
 

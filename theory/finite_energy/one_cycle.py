@@ -86,7 +86,7 @@ class TheoryError(NamedTuple):
     mean_s, captured_mean, peak_mean, p_nc: the square of the lags where each enters; of means also a quarter
         of what the variance leaves out, which is its drift.
     variance: of the peak, relatively: as independent errors half of what is forgotten, half of what depletion
-        takes off, and the square of how far a crossing turns velocities; the rates' own is added.
+        takes off, and half of what turning takes off and its square; the rates' own is added.
     skewness: of the kicks, were each block of path, twice as long as the memory, to have a skewness of 1.
     """
 
@@ -167,7 +167,8 @@ class FiniteEnergy:
         # A shift of a size has an error by the rates too, in the same proportion.
         captured_mean = second + error.lag * second**0.5
         fields = self._fields
-        variance = math.hypot(fields.forgotten / 2, fields.depleted / 2, fields.turned) + error.diffusion
+        turning = fields.turned / 2 + fields.turned**2
+        variance = math.hypot(fields.forgotten / 2, fields.depleted / 2, turning) + error.diffusion
         drift = variance * self.peak[1] / 4
         return TheoryError(
             p * captured_mean + drift,

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
 
 import msgspec
-import typer
 from rich.markup import escape
 
 from conformance import vectors
@@ -22,29 +20,11 @@ from conformance.suite.symmetry import Transform, draw_transform
 from conformance.vectors import Vector
 from mushrooms.check import format_outcome
 from mushrooms.terminal import new_console
-from scene.refusal import MAX_SEED, BadInput
+from scene.refusal import BadInput
 
 
-def ask(
-    case: Annotated[str, typer.Argument(metavar="ID", help="Name of the case, as check prints it.")],
-    command: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[-- COMMAND...]", help="Ask this stepper, and grade its answer."),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(
-            min=0, max=MAX_SEED, help="Ask the question exactly as the run with this seed asked it."
-        ),
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the vector as JSON.")] = False,
-) -> int:
-    """Print a question of the test suite, its proved answer and its rule.
-
-    -- COMMAND also asks a stepper this question, and grades the answer.
-
-    Exit code 0; 1 if the stepper does not pass; 2 on bad input.
-    """
+def ask_case(case: str, command: list[str] | None, seed: int | None, as_json: bool) -> int:
+    """Print a question with its answer and rule; ask a stepper too, if one is given; return the exit code."""
     vector = _find(case, seed)
     transform = Transform() if seed is None else draw_transform(vector, seed)
     result = _put(command, vector, transform) if command else None

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich.table import Column, Table
 
 import fast
@@ -16,38 +15,13 @@ from conformance.files import write_file
 from mushrooms import output
 from mushrooms.terminal import announce_compilation, new_console, progress_bar
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined
-from scene.refusal import MAX_SEED
 
 CHOICES = ("reference", "fast", "both")
-MAX_CASES = 10**7
 SLOWEST = 10.0  # seconds that one question may take the reference: its work is bounded
 
 
-def attack(
-    family: Annotated[str, typer.Option(help="Name of a family of questions, or all.")] = "all",
-    cases: Annotated[
-        int, typer.Option(min=1, max=MAX_CASES, help=f"Cases of each family, 1 to {MAX_CASES}.")
-    ] = 100,
-    seed: Annotated[
-        int,
-        typer.Option(
-            min=0,
-            max=MAX_SEED,
-            help="Seed of the questions, 0 to 2^64 - 1. Family, seed and index identify a case.",
-        ),
-    ] = 0,
-    stepper: Annotated[str, typer.Option(help="Stepper to ask: reference, fast or both.")] = "both",
-    json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write the counts and every wrong case.")
-    ] = None,
-) -> int:
-    """Ask our own steppers random questions that are aimed at their weak points.
-
-    The verifier proves the answer of the reference, and the fast stepper is compared with it. Each wrong
-    answer and each unproved claim is printed as a line of JSON.
-
-    Exit code 1 if an answer is wrong or the reference took over 10 s, 2 on bad input, else 0.
-    """
+def attack_steppers(family: str, cases: int, seed: int, stepper: str, json_file: Path | None) -> int:
+    """Ask steppers the questions of one family or of all, print the counts, and return the exit code."""
     if stepper not in CHOICES:
         raise BadInput(f"--stepper = {stepper!r}, must be one of {', '.join(CHOICES)}")
     names = list(FAMILIES) if family == "all" else [family]

@@ -6,9 +6,7 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
 
-import typer
 from rich import progress
 
 import fast
@@ -19,71 +17,41 @@ from conformance.audit.runs import Size
 from conformance.audit.session import AuditResult, AuditSettings
 from conformance.files import write_files
 from mushrooms import audit_runs, output
+from mushrooms.audit_ensemble import Options, audit_ensemble
 from mushrooms.output import locked
+from mushrooms.reports import audit_page
 from mushrooms.terminal import announce_compilation, progress_bar, refuse_unheeded
-from scene.refusal import MAX_SEED, BadInput
+from scene.refusal import BadInput
 
 
-def audit(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the report.")] = Path("audit-report"),
-    full: Annotated[bool, typer.Option("--full", help="The paper's sizes; an hour on two cores.")] = False,
-    only: Annotated[
-        str | None, typer.Option(metavar="IDS", help="Only these claims, separated by commas: X2,L4.")
-    ] = None,
-    seed: Annotated[
-        int, typer.Option(min=0, max=MAX_SEED, help="Seed of the random starts, 0 to 2^64 - 1.")
-    ] = 0,
-    threads: Annotated[int | None, typer.Option(min=1, help="Threads; all cores by default.")] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Continue with DIR/runs and DIR/findings.")
-    ] = False,
-    commands: Annotated[
-        bool, typer.Option("--commands", help="Print the runs as simulate commands, one per line, and stop.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-    ensemble: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Audit this ensemble: CSV, Parquet or Zarr.")
-    ] = None,
-    scene: Annotated[str | None, typer.Option(metavar="SCENE", help="Scene of --ensemble.")] = None,
-    backwards: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="An ensemble of the reversed cycle, to compare with --ensemble."),
-    ] = None,
-    energy: Annotated[
-        float | None,
-        typer.Option(min=0, help="Initial energy: chooses rows, or replaces a missing column E0."),
-    ] = None,
-    energy_unit: Annotated[str | None, typer.Option(help="Unit of energies: v2/2 (default) or v2.")] = None,
-    time_unit: Annotated[
-        str | None, typer.Option(help="Unit of times: scene or cycles; default: inferred.")
-    ] = None,
-    particles: Annotated[
-        int | None, typer.Option(help="Number of started particles, if some have no row.")
-    ] = None,
-) -> None:
-    """Check the claims of the paper. Writes report.html, report.json and report.txt.
-
-    Particles are stored in DIR/runs/NAME, like those of simulate --out, and results in DIR/findings. --resume
-    continues after an interruption, with --full or with other claims (--only). The report then holds the
-    old and the new claims. The runs that --commands prints may be made anywhere; --resume uses them. No run
-    is ever replaced.
-
-    --ensemble compares an ensemble of another program with theory at its energy.
-
-    Exit code 0 if every claim has its expected verdict, 1 if one has not, 2 on bad input.
-    """
-    theirs = {"--scene": scene, "--backwards": backwards, "--energy": energy, "--energy-unit": energy_unit}
-    theirs |= {"--time-unit": time_unit, "--particles": particles}
+def audit_claims(
+    out: Path,
+    full: bool,
+    only: str | None,
+    seed: int,
+    threads: int | None,
+    resume: bool,
+    commands: bool,
+    as_json: bool,
+    ensemble: Path | None,
+    scene: str | None,
+    backwards: Path | None,
+    energy: float | None,
+    energy_unit: str | None,
+    time_unit: str | None,
+    particles: int | None,
+) -> int:
+    """Check the paper's claims, or an ensemble of another program; return the exit code."""
+    of_ensemble = {"--scene": scene, "--backwards": backwards, "--energy": energy}
+    of_ensemble |= {"--energy-unit": energy_unit, "--time-unit": time_unit, "--particles": particles}
     if ensemble is None:
-        refuse_unheeded(theirs, "there is no --ensemble")
-        _audit_paper(out, full, only, seed, threads, resume, commands, as_json)
-        return
-    from mushrooms.audit_ensemble import Options, audit_ensemble
-
-    ours = {"--full": full or None, "--only": only, "--threads": threads, "--resume": resume or None}
-    refuse_unheeded({**ours, "--commands": commands or None}, "an --ensemble is audited")
+        refuse_unheeded(of_ensemble, "there is no --ensemble")
+        return _audit_paper(out, full, only, seed, threads, resume, commands, as_json)
+    of_paper = {"--full": full or None, "--only": only, "--threads": threads}
+    of_paper |= {"--resume": resume or None, "--commands": commands or None}
+    refuse_unheeded(of_paper, "an --ensemble is audited")
     options = Options(energy, energy_unit or "v2/2", time_unit, particles)
-    raise typer.Exit(audit_ensemble(ensemble, scene, backwards, options, out, as_json))
+    return audit_ensemble(ensemble, scene, backwards, options, out, as_json)
 
 
 def _audit_paper(
@@ -95,10 +63,8 @@ def _audit_paper(
     resume: bool,
     commands: bool,
     as_json: bool,
-) -> None:
+) -> int:
     """Conduct the audit of the paper's claims."""
-    from mushrooms.reports import audit_page  # drawing takes a second to import
-
     if only is not None and not only.replace(",", " ").split():
         raise BadInput(f"--only = {only!r}, must name a claim such as X2; all are checked without it")
     claims = select_claims(only or "")
@@ -106,7 +72,7 @@ def _audit_paper(
     if commands:
         lines = [audit_runs.command(run, size, seed, out) for run in audit_runs.needed(claims, size)]
         print(json.dumps(lines, indent=2) if as_json else "\n".join(lines))
-        return
+        return 0
     with output.writable_folder(out) as folder, locked(folder):
         settings = AuditSettings(size, seed, threads, folder / "findings", resume)
         # What a killed audit was writing: no other process writes under these names, as the folder is held.
@@ -125,7 +91,7 @@ def _audit_paper(
     else:
         print(texts["report.txt"], end="")
         print(f"Report: {folder / 'report.html'}")
-    raise typer.Exit(0 if result.is_passed else 1)
+    return 0 if result.is_passed else 1
 
 
 def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -> AuditResult:
@@ -136,14 +102,18 @@ def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -
         _check_report(folder, wanted)
     runs = audit_runs.KeptRuns(folder, settings.resume)
     runs.check(audit_runs.needed(claims, settings.size), settings.seed)
-    with announce_compilation(), progress_bar() as bar:
-        return session.conduct(
-            AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
-            settings,
-            claims=claims,
-            simulate_run=runs.simulate,
-            progress=_advance(bar),
-        )
+    try:
+        with announce_compilation(), progress_bar() as bar:
+            return session.conduct(
+                AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
+                settings,
+                claims=claims,
+                simulate_run=runs.simulate,
+                progress=_advance(bar),
+            )
+    except KeyboardInterrupt as error:
+        error.add_note("finished parts are in the folder of the report: --resume continues the audit")
+        raise
 
 
 def _check_report(folder: Path, wanted: set[str]) -> None:

@@ -7,9 +7,7 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
 
-import typer
 from rich.markup import escape
 from rich.table import Column, Table
 
@@ -24,8 +22,10 @@ from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
 from mushrooms import bench_solvers as ours
 from mushrooms import output
+from mushrooms.figures import speed, style
+from mushrooms.reports import bench_page
 from mushrooms.terminal import announce_compilation, new_console, progress_bar, refuse_unheeded
-from scene.refusal import MAX_SEED, BadInput
+from scene.refusal import BadInput
 
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
 # By size: questions of a workload, steps with walls only, runs, trajectories and their length.
@@ -36,42 +36,19 @@ LASTING = {"quick": (3e6, 4e8), "full": (2e7, 4e9)}  # ns: of a run at least, of
 PATHS = {"quick": (3, 40), "full": (9, 80)}
 
 
-def bench(
-    command: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[-- COMMAND...]", help="Also measure this stepper; it speaks protocol 1."),
-    ] = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path("bench-report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and runs: five minutes.")] = False,
-    seed: Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of the questions, 0 to 2^64 - 1.")] = 0,
-    table: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="OLD.json", help="Print a table of an earlier bench.json as Markdown, and stop."
-        ),
-    ] = None,
-    workload: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Workload of --table, or `all`; default: moving-cap-1e7."),
-    ] = None,
+def measure_solvers(
+    command: list[str], out: Path, quick: bool, seed: int, table: Path | None, workload: str | None
 ) -> None:
-    """Measure speed against error. Writes bench.json, bench.svg and bench.html.
-
-    Exit code 0, or 2 on bad input.
-    """
-    from mushrooms.figures import speed, style  # drawing takes a second to import
-    from mushrooms.reports import bench_page
-
-    if table is None:
-        refuse_unheeded({"--workload": workload}, "it needs --table")
-    else:
+    """Measure speed against error and write it into a folder; or print a table of an earlier benchmark."""
+    if table is not None:
         measuring = {"--quick": quick or None, "COMMAND": command or None}
         refuse_unheeded(measuring, "--table measures nothing")
         print(bench_page.to_markdown(record.read(table), workload or "moving-cap-1e7"), end="")
         return
+    refuse_unheeded({"--workload": workload}, "it needs --table")
     size: Size = "quick" if quick else "full"
     with output.writable_folder(out) as folder, announce_compilation():
-        found = _measure(size, seed, command or [])
+        found = _measure(size, seed, command)
         picture = style.svg(speed.headline(found))
         files: dict[str, bytes | str | Writer] = {
             "bench.json": record.encode(found),
@@ -167,8 +144,6 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
 
 
 def _table(found: Record) -> Table:
-    from mushrooms.reports import bench_page
-
     numbers = ("ns/collision", "quartiles", "median ulps", "worst ulps", "wrong", "undecided", "left")
     table = Table(
         "workload", Column("stepper", no_wrap=True), title="Speed against error", title_justify="left"

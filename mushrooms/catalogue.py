@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich.table import Table
 
 import scene as scenes
 from conformance.audit.runs import SCENES
-from mushrooms.terminal import AsJson, new_console
+from mushrooms.terminal import new_console
 from scene.load import catalogue_text, read_data
 from scene.refusal import BadInput
 
 
-def list_scenes(
-    name: Annotated[
-        str, typer.Argument(metavar="NAME", help="Print this scene of the catalogue or of the audit.")
-    ] = "",
-    as_toml: Annotated[bool, typer.Option("--toml", help="Print the scene NAME as a TOML file.")] = False,
-    as_json: AsJson = False,
-) -> None:
-    """List the catalogue. A scene that is refused is shown with the reason. With NAME print that scene."""
+def print_scenes(name: str, as_toml: bool, as_json: bool) -> None:
+    """Print the catalogue, or one scene of it or of the audit."""
     if as_toml and as_json:
         raise BadInput("--toml and --json: must be one of them")
     if as_toml and not name:

@@ -6,11 +6,10 @@ import secrets
 import shlex
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress
@@ -25,9 +24,8 @@ from conformance.suite.session import Limits
 from conformance.suite.sheet import Sheet, grade_answers, signed
 from mushrooms import output
 from mushrooms.terminal import new_console, progress_bar, refuse_unheeded
-from scene.refusal import MAX_SEED, BadInput
+from scene.refusal import BadInput
 
-LONGEST = 7 * 86_400  # seconds
 EVERY = 10.0  # seconds between lines where there is no terminal
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
 MAX_TAUGHT = 5  # of them with what was given and what is certified, or with what was sent
@@ -35,73 +33,39 @@ MAX_SENT = 500  # characters of that, and of a line of standard error
 MAX_ERRORS = 6  # lines of that
 COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
 
-Seed = Annotated[
-    int | None, typer.Option(min=0, max=MAX_SEED, help="Seed of the questions; default: a new one.")
-]
-Total = Annotated[
-    float | None, typer.Option(min=0, max=LONGEST, help="Seconds for the whole run; no limit by default.")
-]
 
-
-def check(
-    command: Annotated[
-        list[str] | None, typer.Argument(metavar="-- COMMAND...", help="The stepper; it speaks protocol 1.")
-    ] = None,
-    level: Annotated[str, typer.Option(help="core, extended or stress.")] = "core",
-    seed: Seed = None,
-    timeout: Annotated[
-        float, typer.Option(min=0, max=LONGEST, help="Seconds for one answer, compilation included.")
-    ] = 120.0,
-    total: Total = None,
-    restarts: Annotated[
-        int, typer.Option(min=0, max=1000, help="Fresh processes after the first, 0 to 1000.")
-    ] = 10,
-    groups: Annotated[
-        str, typer.Option(help="Only these groups of cases, separated by commas; default: all.")
-    ] = "",
-    known_failures: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Known to fail, one per line: ID, ID@SEED, fresh/*, declined/GROUP."
-        ),
-    ] = None,
-    json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="JSON report.")] = None,
-    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="JUnit XML report.")] = None,
-    html: Annotated[Path | None, typer.Option(metavar="FILE", help="HTML report.")] = None,
-    badge: Annotated[Path | None, typer.Option(metavar="FILE", help="Badge (SVG) to publish.")] = None,
-    summary: Annotated[Path | None, typer.Option(metavar="FILE", help="Verdict and scope as JSON.")] = None,
-    questions: Annotated[
-        Path | None,
-        typer.Option(metavar="PATH", help="Write the questions to a .jsonl file, or as CSV into a folder."),
-    ] = None,
-    answers: Annotated[
-        Path | None, typer.Option(metavar="PATH", help="Grade these answers to the file of --questions.")
-    ] = None,
-) -> None:
-    """Test a stepper in any language. COMMAND starts it; it speaks protocol 1 on stdin and stdout.
-
-    Each question is randomly mirrored and rescaled. The seed is printed, and --seed repeats a run.
-    Without a dialogue: --questions writes questions to a file, --answers grades the answers in a file.
-
-    Exit code 0 if everything passes, 1 if something fails, 2 if the options or the suite are at fault.
-    """
-    files = _report_files(json=json_file, junit=junit, html=html, badge=badge, summary=summary)
+def check_stepper(
+    command: list[str],
+    level: str,
+    seed: int | None,
+    timeout: float,
+    total: float | None,
+    restarts: int,
+    groups: str,
+    known_failures: Path | None,
+    reports_asked: Mapping[str, Path | None],
+    questions: Path | None,
+    answers: Path | None,
+) -> int:
+    """Grade a stepper or a file of answers, or write a file of questions; return the exit code."""
+    files = _report_files(reports_asked)
     if questions or answers:
-        unheeded = {"COMMAND": command, "--groups": groups or None, "--known-failures": known_failures}
+        unheeded: dict[str, object] = {"COMMAND": command or None, "--groups": groups or None}
+        unheeded["--known-failures"] = known_failures
         refuse_unheeded(unheeded, "questions and answers are in files")
     if answers:
         run = grade_file(answers, questions, level, seed)
     elif questions:
         refuse_unheeded({str(path): True for path in files}, "nothing is graded yet")
         write_questions(questions, level, seed)
-        return
+        return 0
     else:
         limits = Limits(timeout, restarts, total)
-        run = _run(command or [], level, seed, _names_of(groups), limits, known_failures)
+        run = _run(command, level, seed, _names_of(groups), limits, known_failures)
     for path, content in files.items():
         write_file(path, content(run))
     show(run)
-    raise typer.Exit(run.exit_code())
+    return run.exit_code()
 
 
 def _names_of(groups: str) -> list[str]:
@@ -128,7 +92,7 @@ WRITERS: dict[str, tuple[str, Callable[[Run], bytes | str]]] = {
 }
 
 
-def _report_files(**given: Path | None) -> dict[Path, Callable[[Run], bytes | str]]:
+def _report_files(given: Mapping[str, Path | None]) -> dict[Path, Callable[[Run], bytes | str]]:
     """Return the report files that are asked for, each with what makes its content."""
     files: dict[Path, Callable[[Run], bytes | str]] = {}
     for option, path in given.items():

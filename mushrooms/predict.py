@@ -4,21 +4,14 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-
+import theory
 from conformance.audit.runs import scene_named
 from mushrooms.forecast import expected_collisions
-from mushrooms.terminal import (
-    AsJson,
-    SceneName,
-    print_pairs,
-    progress_bar,
-)
+from mushrooms.terminal import print_pairs, progress_bar
 from scene import Scene
 
-MAX_DIGITS = 1000
 # s = log E1/E0 over one cycle.
 FIGURES = {
     "p_nc": "probability of never being captured in a cycle (eq. ps)",
@@ -44,25 +37,8 @@ FIGURES = {
 }
 
 
-def predict(
-    scene: SceneName,
-    digits: Annotated[
-        int, typer.Option(min=1, max=MAX_DIGITS, help=f"Correct digits, 1 to {MAX_DIGITS}.")
-    ] = 15,
-    energy: Annotated[
-        float | None, typer.Option(min=0, help="Also predict for this initial energy v²/2, > 0.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Print the paper's predictions for one cycle as decimal strings.
-
-    With --energy also predict at that energy, with the possible error of the prediction. This needs rates
-    that python -m conformance.audit.frozen measures. They are known for moving-cap, moving-cap-trivial, both
-    fixed caps, ergodic, retraced-arc, the scenes of the audit, and the reverses of all these. For another
-    scene only the limit of high energies is printed, and a line on stderr says why.
-    """
-    import theory
-
+def print_prediction(scene: str, digits: int, energy: float | None, as_json: bool) -> None:
+    """Print what the theory predicts for one cycle, and at an energy if one is given."""
     found = scene_named(scene)
     with progress_bar() as bar:
         task = bar.add_task("resolution 1 of two or more", total=100)
@@ -77,8 +53,6 @@ def predict(
 
 def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
     """Return the figures of one cycle at an initial energy; where there are none, say why on stderr."""
-    import theory
-
     speed, n_collisions = math.sqrt(2 * energy), expected_collisions(scene, energy, 1)
     first: dict[str, float | bool | None] = {
         "energy": energy,

@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-import os
+import shutil
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich import progress
 from rich.console import Console
 
 from scene.refusal import BadInput
-
-SceneName = Annotated[
-    str,
-    typer.Argument(metavar="SCENE", help="A name of the catalogue or the audit, or a .toml or .json file."),
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 # The compiled functions that a person waits for, and how long in all; the others take a few seconds.
 SLOW_TO_COMPILE = {
@@ -57,10 +50,9 @@ def announce_compilation() -> Iterator[None]:
 
 
 def new_console(*, soft_wrap: bool = False) -> Console:
-    """Return a console for stdout whose tables fit its width, or COLUMNS where it has none."""
-    # A pipe has no width: enough for the tables, unless the reader says.
-    has_width = sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit()
-    return Console(width=None if has_width else 140, highlight=False, soft_wrap=soft_wrap)
+    """Return a console for stdout whose tables fit its width, or COLUMNS; a pipe has room enough for them."""
+    size = shutil.get_terminal_size((140, 25))
+    return Console(width=size.columns, height=size.lines, soft_wrap=soft_wrap, highlight=False)
 
 
 def progress_bar() -> progress.Progress:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
-import typer
 
 import reference
 from conformance import verify as verifier
@@ -22,19 +21,8 @@ from scene.refusal import BadInput, shown
 FIELDS = ("t", "x", "y", "vx", "vy")
 
 
-def verify(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A CSV file, or JSON as in docs/corpus.md.")],
-    scene: Annotated[
-        str | None, typer.Option(metavar="SCENE", help="Scene of a CSV file. Its first row is the start.")
-    ] = None,
-    picture: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw the first false step (.svg).")
-    ] = None,
-) -> None:
-    """Check a trajectory computed in floating point. Each step is judged from the state before it.
-
-    Exit code 0 if every step is proved, 1 if one is not, 2 on bad input.
-    """
+def verify_file(file: Path, scene: str | None, picture: Path | None) -> int:
+    """Judge each step of a trajectory from the state before it, and return the exit code."""
     if picture is not None:
         output.check_file(picture, (".svg",))
     text = _read(file, scene)
@@ -47,7 +35,7 @@ def verify(
     if picture is not None and wrong is not None:
         write_file(picture, _draw(json.loads(text), wrong))
         print(f"Picture of step {wrong + 1}: {picture}")
-    raise typer.Exit(int(n_proved < len(verdicts)))
+    return int(n_proved < len(verdicts))
 
 
 def _read(file: Path, scene: str | None) -> str:

@@ -19,7 +19,7 @@ from support.refusals import assert_refused
 import fast
 import scene as scenes
 from conformance.files import write_files
-from mushrooms import main
+from mushrooms import catalogue
 from mushrooms.predict import FIGURES
 
 MOVING_CAP = """\
@@ -101,7 +101,6 @@ def test_a_broken_off_simulation_leaves_nothing(command_line, tmp_path, monkeypa
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", main.COMMANDS)
 @pytest.mark.parametrize(
     ("error", "told"),
     [
@@ -111,17 +110,16 @@ def test_a_broken_off_simulation_leaves_nothing(command_line, tmp_path, monkeypa
         (RecursionError("maximum depth exceeded"), "nested too deeply: maximum depth exceeded"),
         (BrokenExecutor("no result"), "a process of this run was ended from outside: no result"),
         (OSError(errno.EMFILE, "Too many open files"), "[Errno 24] Too many open files"),
-        (KeyboardInterrupt(), f"interrupted; {main.NOTHING_KEPT}"),
+        (KeyboardInterrupt(), "interrupted; files are written only when they are complete"),
     ],
 )
-def test_only_an_interrupt_is_called_one(command_line, monkeypatch, name, error, told):
-    def broken(_name):
+def test_only_an_interrupt_is_called_one(command_line, monkeypatch, error, told):
+    def broken(*_arguments):
         raise error
 
-    monkeypatch.setattr(main, "command", broken)
-    monkeypatch.setattr(main, "COMMANDS", {name: main.COMMANDS[name]._replace(kept=main.NOTHING_KEPT)})
+    monkeypatch.setattr(catalogue, "print_scenes", broken)
     code = 130 if isinstance(error, KeyboardInterrupt) else 2
-    assert command_line(name) == (code, "", f"mushrooms: {told}\n")
+    assert command_line("scenes") == (code, "", f"mushrooms: {told}\n")
 
 
 def test_a_failed_write_leaves_older_results_alone(tmp_path):
@@ -175,7 +173,6 @@ def test_theory_adds_what_finite_energy_does(command_line):
     assert values["v"] == pytest.approx(44721.36)
     assert 2e4 < values["collisions"] < 2e5
     assert command_line("theory", "ergodic", "--energy", "1e7", "--json")[0] == 0
-    assert_refused(command_line("theory", "moving-cap", "--energy", "0"), "--energy = 0.0")
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,6 @@ from scene.refusal import BadInput
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
 LEAST_BLOCK, MOST_BLOCK = 256, 2**17  # particles: a thread's lanes are full, and memory stays small
 ROOM = 2**12  # particles of a new run's block, however few it has: it may be widened
-LARGEST_BLOCK = 2**20  # particles that may be asked for: in memory some gigabytes
 BLOCK_BYTES = 2**26  # on disk; in memory several times that
 LANES_OF_A_THREAD = 128  # particles that a thread needs to be quick
 MOST_BLOCKS = 10**6

@@ -12,10 +12,9 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import chain, product
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
-import typer
 
 from conformance.files import write_file
 from mushrooms import output
@@ -87,14 +86,8 @@ def _tables(run: StoredRun) -> Iterator[Arrays]:
         yield columns
 
 
-def export(
-    run: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `simulate --out` wrote.")],
-    to: Annotated[Path, typer.Option(metavar="FILE", help="A .parquet, .csv or .npz file.")],
-) -> None:
-    """Write a finished run as one table, one row per particle. An .npz holds the arrays of `fast.Ensemble`.
-
-    The run is read block by block and its checksums are tested. A damaged run is refused.
-    """
+def export_run(run: Path, to: Path) -> None:
+    """Write a finished run as one table."""
     output.check_file(to, tuple(WRITERS))
     write_file(to, partial(WRITERS[to.suffix], open_run(run)))
     print(to)

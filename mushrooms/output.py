@@ -1,14 +1,17 @@
-"""Output: folders and files proved writable before work starts, folders held, the import of pyarrow."""
+"""Output: folders and files proved writable before work starts, folders held, tables as CSV and Parquet."""
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 import platform
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from itertools import chain
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, BinaryIO, TextIO
 
 from conformance.files import named, part
 from scene.refusal import BadInput
@@ -127,6 +130,43 @@ def import_arrow() -> tuple[Any, Any]:
         how = "pip install 'oscillating-mushrooms[parquet]'"
         raise BadInput(f"a .parquet file needs pyarrow: {how}") from None
     return pyarrow, pyarrow.parquet
+
+
+def write_csv(tables: Iterable[Mapping[str, Any]], file: BinaryIO, *, scene: str = "") -> None:
+    """Write tables of the same columns one below the other; numbers read back to the same bits.
+
+    Args:
+        tables: columns by their names, lists or arrays; one table at least.
+        file: open for binary writing.
+        scene: has no place in a CSV file.
+    """
+    text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    for number, columns in enumerate(tables):
+        if number == 0:
+            writer.writerow(columns)
+        lists = (column.tolist() if hasattr(column, "tolist") else column for column in columns.values())
+        writer.writerows(zip(*lists, strict=True))
+    text.flush()
+    text.detach()
+
+
+def write_parquet(tables: Iterable[Mapping[str, Any]], file: BinaryIO, *, scene: str = "") -> None:
+    """Write tables of the same columns, each as a row group, with a scene as metadata.
+
+    Raises:
+        BadInput: pyarrow is not installed.
+    """
+    arrow, parquet = import_arrow()
+    parts = map(arrow.table, tables)
+    first = next(parts)
+    schema = first.schema.with_metadata({"scene": scene} if scene else None)
+    with parquet.ParquetWriter(file, schema) as writer:  # else it would close itself later, in a page
+        for part in chain([first], parts):
+            writer.write_table(part.cast(schema))
+
+
+TABLES = {".csv": write_csv, ".parquet": write_parquet}  # writers, by the ending of the file
 
 
 def _remove_empty(folders: list[Path]) -> None:

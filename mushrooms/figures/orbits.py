@@ -276,6 +276,7 @@ def exponents(
     return figure
 
 
+@rc_context(plots.STYLE)
 def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAMES) -> None:
     """Write a GIF of the walls in motion and the particle with its last flights behind it.
 
@@ -288,21 +289,17 @@ def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAM
     states = orbit.states()
     times = np.linspace(states[0, 0], states[-1, 0], n_frames)
     places, last = orbit.at(times), np.searchsorted(states[:, 0], times, side="right") - 1
-    span = orbit.scene.period
+    unit, name = orbit.scene.period or 1.0, "t/T" if orbit.scene.period else "t"
+    axes = tables.new_slide(orbit.scene)
+    axes.plot(*places[0], "o", color=FREE, markersize=6, markerfacecolor="none", label="start")
+    (trail,) = axes.plot([], [], color=plots.SKY, linewidth=1)
+    (dot,) = axes.plot([], [], "o", color=plots.BLACK, markersize=6)
+    axes.figure.legend(loc="outside lower center")
 
-    def prepare(axes: Axes) -> Callable[[int], str]:
-        axes.plot(*places[0], "o", color=FREE, markersize=6, markerfacecolor="none", label="start")
-        (trail,) = axes.plot([], [], color=plots.SKY, linewidth=1, animated=True)
-        (dot,) = axes.plot([], [], "o", color=plots.BLACK, markersize=6, animated=True)
-        axes.figure.legend(loc="outside lower center")
+    def show(k: int) -> None:
+        trail.set_data(*np.vstack([states[max(0, last[k] - TRAIL) : last[k] + 1, 1:3], places[k]]).T)
+        dot.set_data(*places[k : k + 1].T)
+        title = f"{plots.plain(orbit.scene.name)}   {name} = {(times[k] - times[0]) / unit:.2f}"
+        axes.set_title(title)
 
-        def show(k: int) -> str:
-            path = np.vstack([states[max(0, last[k] - TRAIL) : last[k] + 1, 1:3], places[k]])
-            trail.set_data(*path.T)
-            dot.set_data(*places[k : k + 1].T)
-            turn = (times[k] - times[0]) / span if span else times[k] - times[0]
-            return f"{plots.plain(orbit.scene.name)}   {'t/T' if span else 't'} = {turn:.2f}"
-
-        return show
-
-    tables.write_frames(orbit.scene, times.tolist(), prepare, file)
+    tables.write_frames(orbit.scene, axes, times.tolist(), show, file)

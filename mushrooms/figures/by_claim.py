@@ -97,7 +97,7 @@ ALL = (
         _sums,
         (MANY_SLOWER,),
     ),
-    Picture("X5", "c = 0: one narrow peak.", lambda s: cycles.ergodic(s["ergodic@1e7"]), ("ergodic@1e7",)),
+    Picture("X5", "c = 0: one narrow peak.", lambda s: cycles.energies([s["ergodic@1e7"]]), ("ergodic@1e7",)),
     Picture(
         "X6",
         "Tilted and upright stem: energies of the never captured, each counted from its own theory's "

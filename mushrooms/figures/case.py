@@ -67,10 +67,8 @@ def _draw(scene: Scene, state: State, t: float, both: tuple[Steps, Steps], at: i
     figure, panels = plots.new_figure(7.4, 3.7, 1, 2)
     size = float(np.ptp(np.hstack(draw.walls(scene, t)), axis=1).max())
     for axes in panels:
-        for wall in draw.walls(scene, state.t):
-            axes.plot(*wall, color=plots.GREY, linewidth=1)
-        for wall in draw.walls(scene, t):
-            axes.plot(*wall, color=plots.BLACK, linewidth=1, linestyle=":")
+        draw.draw_walls(axes, scene, state.t, color=plots.GREY, linewidth=1)
+        draw.draw_walls(axes, scene, t, color=plots.BLACK, linewidth=1, linestyle=":")
         for steps, (colour, width, name) in zip(both, STROKES, strict=True):
             x, y = ([getattr(state, place), *(step[place] for step in steps)] for place in "xy")
             style = {"marker": ".", "markersize": 3 * width, "linestyle": line, "alpha": 0.75, "label": name}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,8 @@ from conformance.audit.claim import energies_of
 from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, adiabatic_limit, predicted, summed, width
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.runs import Sample, scene_of
-from conformance.audit.tolerances import mean, share, spread
-from mushrooms.figures.energies import N_PLACES, draw, gathered, panels
+from conformance.audit.tolerances import Mean, share
+from mushrooms.figures.energies import N_PLACES, draw, draw_never_captured, gathered, panels
 from mushrooms.figures.style import (
     BLACK,
     BLUE,
@@ -29,7 +30,7 @@ from mushrooms.figures.style import (
 )
 from scene import load
 from scene.laws import values
-from scene.tables import Mushroom
+from scene.tables import Mushroom, laws
 
 N_SUM_BINS = 300
 N_LOOP = 240
@@ -40,15 +41,11 @@ def loops() -> Figure:
     """Draw the cycles: in the plane (w, h) of sec. 4.1 and the plane (V_ell/V_cap, V_cap/V) of sec. 3.5."""
     figure, axes = new_figure(9.6, 3.4, 1, 3)
     fixed, moving = load("fixed-cap-anticlockwise"), load("moving-cap")
-    assert isinstance(fixed, Mushroom)
-    times = np.linspace(0, 1, N_LOOP + 1)
-    w, h = (values(law, times) for law in (fixed.w or 0.0, fixed.h))
+    w, h = (values(laws(fixed)[name], np.linspace(0, 1, N_LOOP + 1)) for name in "wh")
     _loop(axes[0], w, h)
     axes[0].set(xlabel="half-width w", ylabel="depth h", title="fixed cap, anticlockwise")
-    for panel, scene, title in (
-        (axes[1], fixed, "fixed cap, anticlockwise"),
-        (axes[2], moving, "moving cap"),
-    ):
+    titles = ("fixed cap, anticlockwise", "moving cap")
+    for panel, scene, title in zip(axes[1:], (fixed, moving), titles, strict=True):
         _loop(panel, *(np.array([*values, values[0]]) for values in volume_loop(scene, N_LOOP)))
         panel.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=title)
     axes[2].legend(loc="best", title="t / T")
@@ -67,12 +64,18 @@ def _loop(axes: Axes, x: FloatArray, y: FloatArray) -> None:
             axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 0})
 
 
-def _bars(axes: Axes, values: FloatArray, edges: FloatArray, n: int, **style: Any) -> FloatArray:
-    """Draw a histogram of n particles' values as a density, and return its heights."""
-    heights: FloatArray = np.histogram(values, edges)[0] / (n * np.diff(edges))
+def _bars(axes: Axes, values: FloatArray, edges: FloatArray, n: int | None = None, **style: Any) -> None:
+    """Draw a histogram of values as a density; n are all, where some have no value."""
+    heights = np.histogram(values, edges)[0] / ((n or len(values)) * np.diff(edges))
     usual: dict[str, Any] = {"fill": True, "color": SKY, "label": "simulation"}
     axes.stairs(heights, edges, **usual | style)
-    return heights
+
+
+def points(axes: Axes, x: Sequence[float] | FloatArray, values: Sequence[Mean], **style: Any) -> None:
+    """Draw measured values with their standard errors."""
+    found, errors = zip(*values, strict=True)
+    usual: dict[str, Any] = {"fmt": "o", "markersize": 4, "label": "simulation, ± 1 standard error"}
+    axes.errorbar(x, found, errors, capsize=2, **usual | {"color": BLUE} | style)
 
 
 def retraced(sample: Sample) -> Figure:
@@ -128,18 +131,16 @@ def energies(samples: list[Sample]) -> Figure:
 
 
 def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
-    prediction = adiabatic_limit(sample.run)
-    title = f"{sample.run.scene}, E0 = {power(sample.run.energy)}, {sample.n:,} particles"
     found = predicted(sample)
     bars = gathered(sample.gain, float(found.peak[1] ** 0.5))
     draw(axes, rest, bars, found)
-    axes.set_title(title)
-    edges = bars.edges
-    x = np.linspace(edges[0], edges[-1], N_PLACES)
-    sharp = np.diff(energies_of(sample.run.name).captured_below(x)) / np.diff(x)
-    axes.plot((x[1:] + x[:-1]) / 2, sharp, color=ORANGE, linewidth=1.2, label="theory, captured, sharp")
-    centre = float(prediction.log_e_nc)
-    axes.axvline(centre, color=ORANGE, linestyle="--", linewidth=1.2, label="theory, never captured")
+    axes.set_title(f"{sample.run.scene}, E0 = {power(sample.run.energy)}, {sample.n:,} particles")
+    limit = energies_of(sample.run.name)
+    if limit.p_nc < 1:
+        x = np.linspace(bars.edges[0], bars.edges[-1], N_PLACES)
+        sharp = np.diff(limit.captured_below(x)) / np.diff(x)
+        axes.plot((x[1:] + x[:-1]) / 2, sharp, color=ORANGE, linewidth=1.2, label="theory, captured, sharp")
+    draw_never_captured(axes, float(limit.s_nc))
 
 
 def capture_times(samples: list[Sample]) -> Figure:
@@ -168,89 +169,51 @@ def sums(cases: list[tuple[Sample, int]]) -> Figure:
 
 
 def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
-    total = sample.s[:, n - 1] / n
     drawn = summed(sample.run.name, n)
     centre, sd = drawn.mean / n, drawn.sd / n
     density, places = np.histogram(drawn.values / n, N_SUM_BINS, density=True)
     x = (places[1:] + places[:-1]) / 2
-    edges = np.linspace(centre - 5 * sd, centre + 5 * sd, 51)
-    _bars(axes, total, edges, sample.n, baseline=1e-9)
+    _bars(axes, sample.s[:, n - 1] / n, np.linspace(centre - 5 * sd, centre + 5 * sd, 51), baseline=1e-9)
     axes.plot(x, density, color=BLACK, linewidth=1.3, label="sums of n cycles, by theory")
     axes.plot(x, norm.pdf(x, centre, sd), color=ORANGE, linestyle="--", linewidth=1.2, label="Gaussian")
     top = float(norm.pdf(0) / sd)
-    axes.set(
-        yscale=scale,
-        xlim=(edges[0], edges[-1]),
-        ylim=(0, 1.4 * top) if scale == "linear" else (top * 1e-5, 2 * top),
-        xlabel=f"(1/{n}) ln(E_{n}/E0)",
-        ylabel="density",
-        title=f"n = {n}, E0 = {power(sample.run.energy)}, {sample.n:,} particles",
-    )
+    limits = (0, 1.4 * top) if scale == "linear" else (top * 1e-5, 2 * top)
+    axes.set(yscale=scale, xlim=(centre - 5 * sd, centre + 5 * sd), ylim=limits)
+    axes.set(xlabel=f"(1/{n}) ln(E_{n}/E0)", ylabel="density")
+    axes.set_title(f"n = {n}, E0 = {power(sample.run.energy)}, {sample.n:,} particles")
 
 
 def losses(sample: Sample) -> Figure:
     """Draw the share with less energy than at first against the number of cycles."""
     figure, axes = new_figure(5.6, 3.6)
-    scene = scene_of(sample.run)
-    n = np.arange(1, sample.run.n_cycles + 1)
-    found = predicted(sample).draw(sample.run.n_cycles, N_DRAWN // sample.run.n_cycles, DRAWN_SEED)
-    axes.plot(n, (found < 0).mean(axis=0), color=BLACK, linewidth=1.3, label="theory at this energy, drawn")
-    places = np.unique(np.geomspace(1, n[-1], 12).astype(int))
-    far = [theory.loss_probability(scene, int(k)) for k in places]
+    scene, n_cycles = scene_of(sample.run), sample.run.n_cycles
+    found = predicted(sample).draw(n_cycles, N_DRAWN // n_cycles, DRAWN_SEED)
+    label = "theory at this energy, drawn"
+    axes.plot(np.arange(1, n_cycles + 1), (found < 0).mean(axis=0), color=BLACK, linewidth=1.3, label=label)
+    places = np.unique(np.geomspace(1, n_cycles, 12).astype(int))
+    far = np.array([theory.loss_probability(scene, int(k)) for k in places])
     axes.plot(places, far, "s", color=ORANGE, markersize=4, label="theory at infinite energy")
-    rate = float(theory.rarity(scene).rate)
-    late = np.array([places[len(places) // 2], places[-1]])
-    axes.plot(
-        late, far[-1] * np.exp(rate * (late[-1] - late)), ":", color=ORANGE, label=f"exp(-{rate:.4f} n)"
-    )
-    shares = [share(sample.s[:, k - 1] < 0) for k in places]
-    errors = [one.error for one in shares]
-    values = [one.value for one in shares]
-    axes.errorbar(places, values, errors, fmt="o", color=BLUE, markersize=4, label="simulation")
-    axes.set(
-        yscale="log",
-        xlabel="cycles n",
-        ylabel="P(E_n < E0)",
-        title=f"{sample.run.name}, {sample.n:,} particles",
-    )
+    rate, late = float(theory.rarity(scene).rate), places[len(places) // 2 :]
+    slope = far[-1] * np.exp(rate * (n_cycles - late))
+    axes.plot(late, slope, ":", color=ORANGE, label=f"exp(-{rate:.4f} n)")
+    points(axes, places, [share(sample.s[:, k - 1] < 0) for k in places])
+    axes.set(yscale="log", xlabel="cycles n", ylabel="P(E_n < E0)")
+    axes.set_title(f"{sample.run.name}, {sample.n:,} particles")
     axes.legend(fontsize=8)
-    return figure
-
-
-def ergodic(sample: Sample) -> Figure:
-    """Draw the histogram of c = 0."""
-    figure, axes = new_figure(5.2, 3.2)
-    sigma, found = spread(sample.gain).value, mean(sample.gain)
-    edges = np.linspace(-4.5 * sigma, 4.5 * sigma, 61)
-    _bars(axes, sample.gain, edges, sample.n, label=f"simulation, {sample.n:,} particles")
-    x = np.linspace(edges[0], edges[-1], 400)
-    label = f"Gaussian, sd {sigma:.4f}, mean sd²/4 = {sigma**2 / 4:.1e}"
-    axes.plot(x, norm.pdf(x, sigma**2 / 4, sigma), color=BLACK, linewidth=1.3, label=label)
-    axes.set(
-        xlabel="ln(E1/E0)",
-        ylabel="density",
-        ylim=(0, 0.62 / sigma),
-        title=f"c = 0, E0 = {power(sample.run.energy)}: mean {found.value:.1e} ± {found.error:.1e}",
-    )
-    axes.legend(loc="upper center")
     return figure
 
 
 def stems(tilted: Sample, upright: Sample) -> Figure:
     """Draw the uncaptured particles' energies of both stems, each from its own theory's."""
     figure, axes = new_figure(9.6, 3.4, 1, 2)
-    edges = np.linspace(-0.4, 0.8, 121)
-    styles: tuple[tuple[Sample, dict[str, Any]], ...] = (
-        (tilted, {"label": "tilted stem"}),
-        (upright, {"color": BLUE, "fill": False, "linewidth": 1.5, "label": "upright stem"}),
-    )
+    edges, sigma = np.linspace(-0.4, 0.8, 121), width(tilted).value
+    outline: dict[str, Any] = {"color": BLUE, "fill": False, "linewidth": 1.5}
     for panel, scale in zip(axes, ("linear", "log"), strict=True):
-        for sample, style in styles:
+        for sample, label, style in ((tilted, "tilted stem", {}), (upright, "upright stem", outline)):
             kept = sample.gain[~sample.captured] - float(adiabatic_limit(sample.run).log_e_nc)
-            _bars(panel, kept, edges, len(kept), baseline=1e-3 if scale == "log" else 0, **style)
-        x, sigma = np.linspace(-0.4, 0.8, 600), width(tilted).value
-        gaussian = norm.pdf(x, sigma**2 / 4, sigma)
-        panel.plot(x, gaussian, color=GREEN, linewidth=1.2, label="Gaussian, tilted stem's width")
+            _bars(panel, kept, edges, baseline=1e-3, label=label, **style)
+        gaussian = norm.pdf(edges, sigma**2 / 4, sigma)
+        panel.plot(edges, gaussian, color=GREEN, linewidth=1.2, label="Gaussian, tilted stem's width")
         panel.set(xlabel="ln(E1/E0) of the never captured, from theory's", ylabel="density", yscale=scale)
     axes[1].set(ylim=(1e-3, 10))
     axes[0].legend()

@@ -131,7 +131,7 @@ def histogram(scene: Scene, energy: float, gains: Gains, n_particles: int | None
     else:
         figure, [(axes, rest)] = panels(1)
         draw(axes, rest, bars, found)
-        _never_captured(axes, float(found.peak[0]))
+        draw_never_captured(axes, float(found.peak[0]))
     axes.set_title(_title(scene, energy, bars, n_particles))
     figure.legend(loc="outside lower center")
     return figure
@@ -206,10 +206,11 @@ def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
         label = "theory, captured, at high energies"
         axes.plot((x[1:] + x[:-1]) / 2, density, color=ORANGE, linewidth=1.4, label=label)
     if limit.p_nc > 0:
-        _never_captured(axes, float(limit.s_nc))
+        draw_never_captured(axes, float(limit.s_nc))
 
 
-def _never_captured(axes: Axes, place: float) -> None:
+def draw_never_captured(axes: Axes, place: float) -> None:
+    """Draw where theory has the particles that are never captured."""
     axes.axvline(place, color=ORANGE, linestyle="--", linewidth=1.2, label="theory, never captured")
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import theory
@@ -15,6 +13,7 @@ from conformance.audit.claims.exponents import nu_gap, zone_share
 from conformance.audit.claims.finite_energy import fitted
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import Mean, mean, share
+from mushrooms.figures.cycles import points
 from mushrooms.figures.orbits import draw_map, draw_section
 from mushrooms.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
 from mushrooms.orbits import follow
@@ -34,22 +33,16 @@ def zone(samples: list[Sample]) -> Figure:
         fine = np.linspace(0, span, 400)
         curve = theory.chaotic_zone(scene_of(sample.run), fine)
         left.plot(fine / span, curve.log_energy - curve.log_energy[0], color=ORANGE, label="theory, eq. (dE)")
-        _points(left, sample.run.phases, means)
+        points(left, sample.run.phases, means)
         left.set(xlabel="t / T", ylabel="mean ln(E/E0), not captured so far", title=sample.run.name)
         right.plot(fine / span, curve.p_cha, color=ORANGE, label="theory, eq. (ps)")
         shares = zone_share(sample, np.array(times))
         errors = [Mean(float(p), math.sqrt(max(p * (1 - p), 1e-6) / sample.n)) for p in shares]
-        _points(right, sample.run.phases, errors)
+        points(right, sample.run.phases, errors)
         right.set(xlabel="t / T", ylabel="share in the chaotic zone", title=sample.run.name, ylim=(0, 1.05))
         left.legend(loc="lower center")
         right.legend(loc="lower left")
     return figure
-
-
-def _points(axes: Axes, x: tuple[float, ...] | list[float], values: list[Mean], **style: Any) -> None:
-    found, errors = zip(*values, strict=True)
-    usual: dict[str, Any] = {"fmt": "o", "markersize": 4, "label": "simulation, ± 1 standard error"}
-    axes.errorbar(x, found, errors, capsize=2, **usual | {"color": BLUE} | style)
 
 
 def widths(moving: list[Sample], ergodic: list[Sample]) -> Figure:
@@ -59,7 +52,7 @@ def widths(moving: list[Sample], ergodic: list[Sample]) -> Figure:
         energies, values = [sample.run.energy for sample in samples], [width(sample) for sample in samples]
         fit = fitted(samples, values)
         text = f"{label}: exponent {fit.exponent:.4f} ± {fit.exponent_error:.4f}"
-        _points(axes, energies, values, fmt=marker, color=colour, markersize=5, label=text)
+        points(axes, energies, values, fmt=marker, color=colour, markersize=5, label=text)
         axes.plot(energies, fit.coefficient * np.array(energies) ** fit.exponent, color=colour, linewidth=1)
     x = np.array([moving[0].run.energy, moving[-1].run.energy])
     printed = width(moving[0]).value * (x / x[0]) ** 0.25
@@ -81,7 +74,7 @@ def convergence(samples: list[Sample]) -> Figure:
         ("mean of exp(-s/2)", [mean(np.exp(-s.gain / 2)) for s in samples], float(unbiased)),
     )
     for panel, (label, values, truth) in zip(axes, rows, strict=True):
-        _points(panel, energies, values)
+        points(panel, energies, values)
         panel.axhline(truth, color=ORANGE, label="theory, infinite E0")
         panel.set(xscale="log", xlabel="E0", title=label)
     fit = theory.extrapolate(energies, [v.value for v in rows[0][1]], [v.error for v in rows[0][1]])

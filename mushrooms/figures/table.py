@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from mpmath import fp
 from PIL import Image
 
@@ -30,6 +31,14 @@ def walls(scene: Scene, t: float) -> list[np.ndarray]:
     """Return the walls at time t as polylines of shape (2, n) [length]; the mouth is left open."""
     check_scene(scene)
     return [np.transpose(line) for line in table_at(fp, scene, t).outline()]
+
+
+def draw_walls(axes: Axes, scene: Scene, t: float, **style: Any) -> list[Line2D]:
+    """Draw the walls at time t; a label is that of the first line."""
+    lines = [axes.plot(*line, **style)[0] for line in walls(scene, t)]
+    for line in lines[1:]:
+        line.set_label("_")
+    return lines
 
 
 def phases(scene: Scene, n: int = N_PHASES) -> list[float]:
@@ -80,8 +89,7 @@ def new_strip(scene: Scene, width: float, max_height: float) -> Figure:
         zip(np.ravel(grid), times, plots.phase_colours(len(times)), strict=True)
     ):
         axes.plot(*chords(scene, t), color=plots.GREY, linewidth=0.6)
-        for line in walls(scene, t):
-            axes.plot(*line, color=colour, linewidth=2, solid_capstyle="butt")
+        draw_walls(axes, scene, t, color=colour, linewidth=2, solid_capstyle="butt")
         _set_frame(axes, scene)
         axes.set_title(f"t/T = {k}/{len(times)}" if len(times) > 1 else "static")
         axes.label_outer()
@@ -136,7 +144,7 @@ def write_frames(
         show: receives the number of a frame, and draws what moves besides the walls.
         file: open for binary writing.
     """
-    lines = [axes.plot(*line, color=plots.BLUE, linewidth=2)[0] for line in walls(scene, times[0])]
+    lines = draw_walls(axes, scene, times[0], color=plots.BLUE, linewidth=2)
     canvas: Any = axes.figure.canvas
     frames = []
     for k, t in enumerate(times):

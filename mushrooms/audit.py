@@ -1,10 +1,15 @@
-"""`mushrooms audit`: conducts the audit with the fast stepper and writes its report."""
+"""`mushrooms audit`: conducts the audit with the fast stepper and writes its report.
+
+DIR/runs/NAME is what `mushrooms simulate --out` makes, here or elsewhere.
+"""
 
 from __future__ import annotations
 
 import json
+import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from rich import progress
@@ -13,14 +18,21 @@ import fast
 from conformance.audit import session
 from conformance.audit.claim import AuditSteppers, Claim
 from conformance.audit.claims import all_claims, select_claims
-from conformance.audit.runs import Size
+from conformance.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
 from conformance.audit.session import AuditResult, AuditSettings
 from conformance.files import write_files
-from mushrooms import audit_runs, output
+from fast import Ensemble
+from fast.ensemble import SHARE
+from mushrooms import output
 from mushrooms.audit_ensemble import Options, audit_ensemble
 from mushrooms.output import locked
 from mushrooms.reports import audit_page
+from mushrooms.simulate import tell_damaged
+from mushrooms.store import conduct, engines
+from mushrooms.store.run import is_run
+from mushrooms.store.spec import RunSpec
 from mushrooms.terminal import announce_compilation, progress_bar, refuse_unheeded
+from scene import Scene
 from scene.refusal import BadInput
 
 
@@ -70,7 +82,7 @@ def _audit_paper(
     claims = select_claims(only or "")
     size: Size = "full" if full else "quick"
     if commands:
-        lines = [audit_runs.command(run, size, seed, out) for run in audit_runs.needed(claims, size)]
+        lines = [command(run, size, seed, out) for run in needed(claims, size)]
         print(json.dumps(lines, indent=2) if as_json else "\n".join(lines))
         return 0
     with output.writable_folder(out) as folder, locked(folder):
@@ -100,8 +112,8 @@ def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -
         wanted = {claim.id for claim in claims} | session.kept(settings)
         claims = tuple(claim for claim in all_claims() if claim.id in wanted)
         _check_report(folder, wanted)
-    runs = audit_runs.KeptRuns(folder, settings.resume)
-    runs.check(audit_runs.needed(claims, settings.size), settings.seed)
+    runs = KeptRuns(folder, settings.resume)
+    runs.check(needed(claims, settings.size), settings.seed)
     try:
         with announce_compilation(), progress_bar() as bar:
             return session.conduct(
@@ -143,3 +155,92 @@ def _advance(bar: progress.Progress) -> Callable[[str, int, int], None]:
             print(f"{run}: {n_done:,} particles", file=sys.stderr)
 
     return advance
+
+
+FOLDER = "runs"
+
+
+def needed(claims: Sequence[Claim], size: Size) -> list[Simulation]:
+    """Return the runs that claims rest on, in the order in which they are made."""
+    runs = [RUNS[name] for name in dict.fromkeys(name for claim in claims for name in claim.runs)]
+    return [run for run in runs if run.n_particles(size)]
+
+
+def spec_of(run: Simulation, seed: int) -> RunSpec:
+    """Return what decides the bits of a run in the audit of a seed."""
+    return RunSpec(scene_of(run), run.energy, run.n_cycles, run_seed(seed, run), run.phases)
+
+
+def command(run: Simulation, size: Size, seed: int, folder: Path) -> str:
+    """Return the command that makes a run where an audit in the folder takes it up with --resume."""
+    return spec_of(run, seed).command(run.scene, run.n_particles(size), folder / FOLDER / run.name)
+
+
+class KeptRuns:
+    """Runs in the folder of an audit.
+
+    Args:
+        folder: of the audit, held by the caller.
+        resume: whether runs that are there may be gone on with.
+    """
+
+    def __init__(self, folder: Path, resume: bool) -> None:
+        self._folder, self._resume = folder / FOLDER, resume
+
+    def check(self, runs: Sequence[Simulation], seed: int) -> None:
+        """Refuse at once what would be refused when its turn has come.
+
+        Raises:
+            BadInput: the folder of one of these runs holds another, or this one and `resume` was not
+                asked for, or another process writes in it.
+        """
+        for run in runs:
+            place = self._folder / run.name
+            if is_run(place):
+                with locked(place):
+                    conduct.read_description(place, spec_of(run, seed), {})
+                if not self._resume:
+                    how = "--resume takes it up, another --out begins anew"
+                    raise BadInput(f"output {str(place)!r} holds a run of this audit: {how}")
+
+    def simulate(self, name: str) -> Callable[..., Ensemble]:
+        """Return what stands for `fast.simulate` in a run: it follows only what the run's folder lacks."""
+        return partial(self._simulate, self._folder / name)
+
+    def _simulate(
+        self,
+        place: Path,
+        scene: Scene,
+        *,
+        n_particles: int,
+        energy: float,
+        n_cycles: int,
+        seed: int,
+        threads: int | None,
+        phases: tuple[float, ...],
+        progress: Callable[[int], None],
+    ) -> Ensemble:
+        spec = RunSpec(scene, energy, n_cycles, seed, phases)
+        line = spec.command(scene.name, n_particles, place)
+        default = block_size(spec, n_particles, threads or os.cpu_count() or 1)
+        with output.writable_folder(place), locked(place):
+            run, damaged = conduct.open_or_create(
+                place, spec, n_particles, None, default, line, self._resume, at_least=True
+            )
+            tell_damaged(damaged)
+            try:
+                conduct.complete(run, engines.in_process(threads), progress, n_particles=n_particles)
+            except OSError as error:
+                why = error.strerror or error
+                raise BadInput(f"output {str(place)!r}: {why}; --resume takes up what is kept") from None
+            return run.ensemble(n_particles)
+
+
+def block_size(spec: RunSpec, n_particles: int, threads: int) -> int:
+    """Return how many particles of a new run are kept at a time, at most all of them.
+
+    At the end of a block the lanes wait for its slowest particle. Energies spread with the cycles, so that
+    what takes seconds has too few particles to wait for: each thread has a share of `fast`, at the least.
+    """
+    wanted = max(conduct.block_size(spec, threads), SHARE * threads) * spec.n_cycles
+    return min(wanted, conduct.MOST_BLOCK, n_particles)

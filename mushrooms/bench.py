@@ -1,7 +1,11 @@
-"""`mushrooms bench`: speed against error on the same runs, and error growth."""
+"""`mushrooms bench`: speed against error on the same runs, and error growth.
+
+Our steppers are among the solvers that are measured, and the proofs are what all are measured against.
+"""
 
 from __future__ import annotations
 
+import math
 import tempfile
 import time
 from collections.abc import Sequence
@@ -12,19 +16,26 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 import fast
+import reference
+from conformance import plain
 from conformance.bench import baselines, growth, record, solvers, workloads
+from conformance.bench.growth import FAR, PathFollower, PathPoint, Sensitivity
 from conformance.bench.record import Record, Size, quartiles
-from conformance.bench.solvers import Family, Solver, by_command
-from conformance.cases.prover import proved_step
+from conformance.bench.solvers import Family, Solver, SolverAnswer, SolverRun, by_call, by_command
+from conformance.bench.workloads import FLIGHTS, Workload
+from conformance.cases.certify import Links
+from conformance.cases.prover import collided, proved_step
 from conformance.files import Writer, write_files
+from conformance.grading.agreement import Answer, Enclosed, exact
 from conformance.harness.examples import find_examples
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
-from mushrooms import bench_solvers as ours
+from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from mushrooms import output
-from mushrooms.figures import speed, style
+from mushrooms.figures import style
 from mushrooms.reports import bench_page
 from mushrooms.terminal import announce_compilation, new_console, progress_bar, refuse_unheeded
+from scene import Collision, Scene, State
 from scene.refusal import BadInput
 
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
@@ -49,7 +60,7 @@ def measure_solvers(
     size: Size = "quick" if quick else "full"
     with output.writable_folder(out) as folder, announce_compilation():
         found = _measure(size, seed, command)
-        picture = style.svg(speed.headline(found))
+        picture = style.svg(bench_page.headline(found))
         files: dict[str, bytes | str | Writer] = {
             "bench.json": record.encode(found),
             "bench.svg": picture,
@@ -88,7 +99,7 @@ def _measure(size: Size, seed: int, command: list[str]) -> Record:
             tick("")
         n_paths, length = PATHS[size]
         bar.reset(task, total=n_paths, description="error growth")
-        grown = growth.grow(ours.our_followers(), proved_step, ours.prove_path, seed, n_paths, length, tick)
+        grown = growth.grow(our_followers(), proved_step, prove_path, seed, n_paths, length, tick)
     return record.Record(
         format=record.FORMAT,
         size=size,
@@ -110,7 +121,7 @@ def _measure(size: Size, seed: int, command: list[str]) -> Record:
 def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
     """Return solvers, what was compiled, and what cannot run."""
     limits = Limits(TIMEOUT, RESTARTS)
-    found = [*ours.our_solvers(), *baselines.in_python()]
+    found = [*our_solvers(), *baselines.in_python()]
     built, not_run = dict[str, str](), dict[str, str]()
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     try:
@@ -158,3 +169,130 @@ def _table(found: Record) -> Table:
         row = [escape(p.solver), f"{ns:,.0f}", spread, middle, worst, *counts, bench_page.astray(p)]
         table.add_row(p.workload, *row)
     return table
+
+
+DIGITS = (15, 30, 50, 100, 200)
+PATH_DIGITS = (30, 60)  # working decimals of the proofs whose growth is followed
+LANES_SERVE = (
+    "breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12", "two-harmonics",
+    "sixteen-harmonics", "moving-slope", "bang-bang", "one-path",
+)  # fmt: skip
+
+
+def prove_path(scene: Scene, state: State, n_collisions: int) -> tuple[list[PathPoint], list[Sensitivity]]:
+    """Follow a path by proof, right to twenty digits at its end, and chain the Jacobians of its steps."""
+    path, links = reference.trajectory(scene, state, n_collisions, digits=20), Links(scene, state, FAR)
+    chain = [Sensitivity(links.add(step), links.held[0]) for step in path.steps]
+    return _places(path), chain
+
+
+def our_solvers() -> list[Solver]:
+    """Return our steppers: the reference at several precisions, and the fast one's five ways."""
+    return [
+        *(_proof(digits) for digits in DIGITS),
+        by_call("fast, a call", "compiled", fast.next_collision),
+        Solver("fast, careful", "compiled", _careful),
+        Solver("fast, pairs", "compiled", _fine),
+        Solver("fast, lanes", "compiled", _lanes, LANES_SERVE, lane_steps),
+        Solver("fast, trajectory", "compiled", _trajectory, ("one-path",)),
+    ]
+
+
+def our_followers() -> dict[str, PathFollower]:
+    """Return followers of trajectories: binary64, with compensated time, and proofs of fixed precision."""
+    return {
+        "binary64 (plain Python)": _plain_path,
+        "compensated (fast)": _fast_path,
+        "double-double (fast)": _fine_path,
+        **{f"proof, {digits} decimals": _proof_path(digits) for digits in PATH_DIGITS},
+    }
+
+
+def _proof(digits: int) -> Solver:
+    def step(scene: Scene, state: State, t_end: float) -> Answer:
+        found = reference.next_collision(scene, state, t_end, digits=digits)
+        if isinstance(found, reference.Collision):
+            return Enclosed(found.wall, list(collided(found).values()))
+        return found.rounded() if isinstance(found, reference.Horizon) else found
+
+    return by_call(f"proof, {digits} digits", "proof", step)
+
+
+def _careful(workload: Workload, n_times: int) -> SolverRun:
+    answers, seconds = careful_steps(workload.scene, [q.state for q in workload.questions], n_times)
+    return SolverRun(seconds / (n_times * len(answers)) * 1e9, list(answers), seconds * 1e9)
+
+
+def _fine(workload: Workload, n_times: int) -> SolverRun:
+    paths, seconds = fine_steps(workload.scene, [q.state for q in workload.questions], n_times)
+    answers: list[SolverAnswer] = []
+    for path in paths:
+        if path.outcome is None:
+            dt, _, *place = path.numbers(0)
+            answers.append(exact(path.walls[0], (dt, *place)))
+        else:
+            answers.append(path.outcome)
+    return SolverRun(seconds / (n_times * len(answers)) * 1e9, answers, seconds * 1e9)
+
+
+def _lanes(workload: Workload, n_times: int) -> SolverRun:
+    """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
+    states = [q.state for q in workload.questions]
+    copies = -(-128 // len(states))  # enough to fill both pools
+    followed = states[:1] if workload.length else states * copies
+    t_end = workload.end(workload.length or FLIGHTS)
+    seconds, n_collisions = 0.0, 0
+    for _ in range(n_times):
+        n, lasted = flights(workload.scene, followed, t_end)
+        n_collisions, seconds = n_collisions + n, seconds + lasted
+    return SolverRun(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
+
+
+def _trajectory(workload: Workload, n_times: int) -> SolverRun:
+    """Time a path from the first question, the call and its arrays included; grade a step from each."""
+    states = [q.state for q in workload.questions]
+    paths = [fast.trajectory(workload.scene, state, 1) for state in states]
+    begin = time.perf_counter_ns()
+    for _ in range(n_times):
+        fast.trajectory(workload.scene, states[0], workload.length)
+    ns = time.perf_counter_ns() - begin
+    answers: list[SolverAnswer] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
+    return SolverRun(ns / (n_times * workload.length), answers, ns)
+
+
+def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
+    found = plain.trajectory(scene, state, n_collisions, state.t + FAR)
+    return [PathPoint(c.wall, c.x, c.y, c.vx, c.vy) for c in found if isinstance(c, Collision)]
+
+
+def _fast_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
+    path = fast.trajectory(scene, state, n_collisions)
+    return [PathPoint(wall, *row[2:]) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)]
+
+
+def _fine_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
+    path = fast.fine_trajectory(scene, state, n_collisions)
+    found = []
+    for i, wall in enumerate(path.walls):
+        _, _, x, y, vx, vy = path.numbers(i)
+        found.append(PathPoint(wall, x, y, vx, vy))
+    return found
+
+
+def _proof_path(digits: int) -> PathFollower:
+    def follow(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
+        return _places(reference.trajectory(scene, state, n_collisions, working=digits))
+
+    return follow
+
+
+def _places(path: reference.Trajectory) -> list[PathPoint]:
+    found = []
+    for step in path.steps:
+        ends = [c.centre() for c in step.after[1:]]
+        size, speed = (math.hypot(*map(float, pair)) for pair in (ends[:2], ends[2:]))
+        widths = [c.width() for c in step.after[1:]]
+        x, y, vx, vy = ends
+        width = max(max(widths[:2]) / size, max(widths[2:]) / speed)
+        found.append(PathPoint(step.wall, x, y, vx, vy, width))
+    return found

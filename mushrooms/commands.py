@@ -103,9 +103,9 @@ def scenes(
     as_json: AsJson = False,
 ) -> None:
     """List the catalogue. A scene that is refused is shown with the reason. With NAME print that scene."""
-    from mushrooms import catalogue
+    from mushrooms.scenes import print_scenes
 
-    catalogue.print_scenes(name, as_toml, as_json)
+    print_scenes(name, as_toml, as_json)
 
 
 @app.command(epilog="Example: mushrooms theory moving-cap --digits 40")
@@ -122,9 +122,9 @@ def theory(
     fixed caps, ergodic, retraced-arc, the scenes of the audit, and the reverses of all these. For another
     scene only the limit of high energies is printed, and a line on stderr says why.
     """
-    from mushrooms import predict
+    from mushrooms.scenes import print_prediction
 
-    predict.print_prediction(scene, digits, energy, as_json)
+    print_prediction(scene, digits, energy, as_json)
 
 
 Picture = Annotated[
@@ -310,7 +310,7 @@ def attack(
 
     Exit code 1 if an answer is wrong or the reference took over 10 s, 2 on bad input, else 0.
     """
-    from mushrooms.attack import attack_steppers
+    from mushrooms.questions import attack_steppers
 
     return attack_steppers(family, cases, seed, stepper, json_file)
 
@@ -459,7 +459,7 @@ def verify(
 
     Exit code 0 if every step is proved, 1 if one is not, 2 on bad input.
     """
-    from mushrooms.verify import verify_file
+    from mushrooms.questions import verify_file
 
     return verify_file(file, scene, picture)
 
@@ -482,6 +482,6 @@ def ask(
 
     Exit code 0; 1 if the stepper does not pass; 2 on bad input.
     """
-    from mushrooms.ask import ask_case
+    from mushrooms.questions import ask_case
 
     return ask_case(case, command, seed, as_json)

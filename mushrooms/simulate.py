@@ -18,10 +18,9 @@ from conformance.files import write_file
 from fast.starts import one_cycle
 from fast.validation import check_phases
 from mushrooms import compared, output
-from mushrooms.forecast import careful_note
 from mushrooms.output import locked
 from mushrooms.store import conduct, engines
-from mushrooms.store.progress import RunTally, Watch, gain_of, tally_of
+from mushrooms.store.progress import RunTally, Watch, careful_note, gain_of, tally_of
 from mushrooms.store.run import StoredRun
 from mushrooms.store.spec import RunSpec
 from mushrooms.terminal import announce_compilation, print_pairs, progress_bar

@@ -20,7 +20,7 @@ from conformance.bench.baselines import next_collision_by
 from conformance.bench.solvers import Solver, SolverRun, by_call
 from conformance.suite.checks import timing
 from conformance.suite.process import CheckFailure
-from mushrooms import bench_solvers as ours
+from mushrooms import bench as ours
 from scene import BadInput, Collision, Horizon, Undecided
 
 DOCS = Path(__file__).parent.parent / "docs"

@@ -32,7 +32,7 @@ from conformance.cases.prover import ask, flight_of, inputs_of, moved, proved_st
 from conformance.cases.table import FAMILIES
 from conformance.vectors import NUMBERS, Expectation, certified, four_digits
 from conformance.verify import Verdict
-from mushrooms.attack import steppers
+from mushrooms.questions import steppers
 from scene import State, from_data, load
 
 N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "6"))

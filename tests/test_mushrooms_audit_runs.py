@@ -19,7 +19,7 @@ import fast
 import scene as scenes
 from conformance.audit.claims import all_claims
 from conformance.audit.runs import RUNS, SCENES, Sample, Simulation, draw, run_seed, scene_of
-from mushrooms import audit_runs
+from mushrooms import audit
 from mushrooms.output import locked
 from mushrooms.store import conduct
 from mushrooms.store.run import StoredRun, attributes_of
@@ -56,7 +56,7 @@ def followed(monkeypatch):
 
 def kept(folder, run, size="quick", *, resume=True, seed=SEED):
     """Return a run's sample as an audit in the folder has it."""
-    runs = audit_runs.KeptRuns(folder, resume=resume)
+    runs = audit.KeptRuns(folder, resume=resume)
     runs.check([run], seed)
     return draw(runs.simulate(run.name), run, size=size, seed=seed, threads=1)
 
@@ -73,7 +73,7 @@ def assert_same(found, wanted):
 
 def made(command_line, run, folder, n, *more):
     """Make a run as the audit's command says, with n particles."""
-    words = shlex.split(audit_runs.command(run, "quick", SEED, folder))[1:]
+    words = shlex.split(audit.command(run, "quick", SEED, folder))[1:]
     words[words.index("--particles") + 1] = n
     ended = command_line(*words, "--threads", 1, "--json", *more)
     assert ended.code == 0, ended.err
@@ -174,7 +174,7 @@ def test_another_run_or_one_in_use_is_refused_before_anything_is_followed(comman
 
 
 def test_a_run_with_more_cycles_is_refused_before_any_is_followed(tmp_path):
-    run, runs = SMALL["cycles"], audit_runs.KeptRuns(tmp_path, resume=True)
+    run, runs = SMALL["cycles"], audit.KeptRuns(tmp_path, resume=True)
     asked = {"energy": run.energy, "seed": run_seed(SEED, run), "phases": run.phases, "threads": 1}
     longer = {"n_particles": 5, "n_cycles": 4, "progress": lambda _: None}
     runs.simulate(run.name)(scene_of(run), **asked, **longer)
@@ -184,7 +184,7 @@ def test_a_run_with_more_cycles_is_refused_before_any_is_followed(tmp_path):
 
 def test_a_run_is_held_while_the_audit_follows_it(command_line, tmp_path, monkeypatch):
     run, go_on = SMALL["mouth"], fast.go_on
-    words = shlex.split(audit_runs.command(run, "quick", SEED, tmp_path))[1:]
+    words = shlex.split(audit.command(run, "quick", SEED, tmp_path))[1:]
     refused = []
 
     def meanwhile(scene, **options):
@@ -220,7 +220,7 @@ def test_the_commands_of_an_audit_make_its_runs(command_line, tmp_path, monkeypa
         ended = command_line("audit", "--commands", "--out", "here", "--seed", 3, *more)
         assert ended.code == 0
         lines = ended.out.splitlines()
-        runs = audit_runs.needed(all_claims(), size)
+        runs = audit.needed(all_claims(), size)
         assert {run.name for run in runs} == {name for name, run in RUNS.items() if run.n_particles(size)}
         assert len({run_seed(3, run) for run in runs}) == len(lines) == len(runs)
         for line, run in zip(lines, runs, strict=True):
@@ -278,10 +278,10 @@ def test_energies_at_phases_are_kept_drawn_and_exported(command_line, tmp_path):
 
 def test_what_is_not_there_yet_has_no_phase(tmp_path):
     """A run of three blocks of which only the second is kept."""
-    spec = audit_runs.spec_of(SMALL["mouth"], SEED)
+    spec = audit.spec_of(SMALL["mouth"], SEED)
     run, _ = conduct.open_or_create(tmp_path, spec, 150, 64, 64, "", False)
     block_range = list(run.missing())[1]
-    run.keep(block_range, audit_runs.engines.follow(spec, block_range, 1))
+    run.keep(block_range, audit.engines.follow(spec, block_range, 1))
     with xarray.open_zarr(tmp_path / "ensemble.zarr", mask_and_scale=False) as found:
         there = np.zeros(150, bool)
         there[64:128] = True
@@ -295,7 +295,7 @@ def test_without_phases_a_run_says_what_it_always_said(tmp_path):
     kept(tmp_path, run)
     place = tmp_path / "runs" / run.name
     assert "phases" not in attributes_of(place)
-    assert "phases" not in audit_runs.spec_of(run, SEED).to_data()  # nor in what markers are held to
+    assert "phases" not in audit.spec_of(run, SEED).to_data()  # nor in what markers are held to
     assert not list(place.rglob("phase*"))
 
 

@@ -12,7 +12,7 @@ from support.refusals import assert_refused
 
 from conformance.bench import record, workloads
 from mushrooms import bench
-from mushrooms.figures import speed as figures_of_speed
+from mushrooms.reports import bench_page
 
 ROOT = Path(__file__).parent.parent
 FILES = ["bench.html", "bench.json", "bench.svg"]
@@ -58,7 +58,7 @@ def test_a_benchmark_is_written_whole_and_again(call, tmp_path, monkeypatch):
     assert (tmp_path / "one" / "bench.svg").read_text("utf-8").count("moving-cap-1e4") >= 1
 
     # The same seed asks the same questions, so that the errors are the same to the last bit.
-    monkeypatch.setattr(figures_of_speed, "growth", lambda *_: b"<svg/>")  # drawn above
+    monkeypatch.setattr(bench_page, "growth", lambda *_: b"<svg/>")  # drawn above
     monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1])
     assert call("--quick", "--out", tmp_path / "two", "--seed", 5)[0] == 0
     again = record.read(tmp_path / "two" / "bench.json")
@@ -96,10 +96,10 @@ def luminance(colour: str) -> float:
 def test_the_kept_figure_reads_at_a_glance():
     """No two labels touch, none is smaller than 9 points; colours have contrast and marks."""
     kept = record.read(ROOT / "docs" / "bench" / "bench.json")
-    for colour in [*figures_of_speed.COLOURS.values(), figures_of_speed.RED]:
+    for colour in [*bench_page.COLOURS.values(), bench_page.RED]:
         assert 1.05 / (luminance(colour) + 0.05) >= 4.5
-    assert len(set(figures_of_speed.MARKS.values())) == len(figures_of_speed.COLOURS)
-    figure = figures_of_speed.headline(kept)
+    assert len(set(bench_page.MARKS.values())) == len(bench_page.COLOURS)
+    figure = bench_page.headline(kept)
     figure.draw_without_rendering()
     boxes = [Text.get_window_extent(text) for text in figure.axes[0].texts if text.get_text()]
     assert len(boxes) == 9

@@ -19,8 +19,8 @@ from support.refusals import assert_refused
 import fast
 import scene as scenes
 from conformance.files import write_files
-from mushrooms import catalogue
-from mushrooms.predict import FIGURES
+from mushrooms import scenes as catalogue
+from mushrooms.scenes import FIGURES
 
 MOVING_CAP = """\
 table = "mushroom"

@@ -18,12 +18,11 @@ import theory
 from conformance.audit import session
 from conformance.audit.runs import SCENES
 from conformance.files import sealed, unsealed
-from mushrooms import attack, bench, orbits
+from mushrooms import bench, orbits, questions
 from mushrooms.compared import begins_widest, explain_limit, leans_inward, measured
-from mushrooms.forecast import expected_collisions
 from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct, progress
-from mushrooms.store.progress import Gain, RunTally, gain_of
+from mushrooms.store.progress import Gain, RunTally, expected_collisions, gain_of
 from mushrooms.store.run import Block, StoredRun
 from mushrooms.store.spec import RunSpec, shape_of
 from mushrooms.terminal import announce_compilation, progress_bar
@@ -74,7 +73,7 @@ def test_compilation_is_told_when_nothing_is_kept_and_only_then(fresh, capsys):
         (RUN, fast, "simulate"),
         (["audit", "--out"], session, "conduct"),
         (["bench", "--quick", "--out"], bench, "_measure"),
-        (["attack", "--cases", 1, "--json"], attack, "steppers"),
+        (["attack", "--cases", 1, "--json"], questions, "steppers"),
         (["draw", "ergodic", "--trajectory"], orbits, "follow"),
     ],
 )

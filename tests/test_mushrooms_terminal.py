@@ -19,8 +19,8 @@ from support.refusals import assert_refused, one_line
 import theory
 from mushrooms.commands import app
 from mushrooms.figures import table
-from mushrooms.forecast import expected_collisions
 from mushrooms.main import INTERRUPTED, run
+from mushrooms.store.progress import expected_collisions
 from mushrooms.terminal import new_console, print_pairs
 from scene import BangBang, Mushroom, load
 

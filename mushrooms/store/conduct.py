@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from mushrooms.forecast import expected_collisions
 from mushrooms.store.engines import Engine, follow
+from mushrooms.store.progress import expected_collisions
 from mushrooms.store.run import Block, BlockRange, StoredRun, attributes_of, is_run
 from mushrooms.store.spec import Arrays, RunSpec, difference, made_by, shape_of
 from scene.refusal import BadInput

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -31,7 +30,7 @@ from mushrooms.simulate import tell_damaged
 from mushrooms.store import conduct, engines
 from mushrooms.store.run import is_run
 from mushrooms.store.spec import RunSpec
-from mushrooms.terminal import announce_compilation, progress_bar, refuse_unheeded
+from mushrooms.terminal import Watch, announce_compilation, progress_bar, refuse_unheeded
 from scene import Scene
 from scene.refusal import BadInput
 
@@ -121,7 +120,7 @@ def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -
                 settings,
                 claims=claims,
                 simulate_run=runs.simulate,
-                progress=_advance(bar),
+                progress=_watch_runs(bar),
             )
     except KeyboardInterrupt as error:
         error.add_note("finished parts are in the folder of the report: --resume continues the audit")
@@ -142,17 +141,14 @@ def _check_report(folder: Path, wanted: set[str]) -> None:
         )
 
 
-def _advance(bar: progress.Progress) -> Callable[[str, int, int], None]:
-    tasks: dict[str, progress.TaskID] = {}
-    finished = set[str]()
+def _watch_runs(bar: progress.Progress) -> Callable[[str, int, int], None]:
+    """Return what moves a bar for each run."""
+    watches: dict[str, Watch] = {}
 
     def advance(run: str, n_done: int, n_total: int) -> None:
-        if run not in tasks:
-            tasks[run] = bar.add_task(run, total=n_total)
-        bar.update(tasks[run], completed=n_done)
-        if n_done == n_total and run not in finished and bar.disable:
-            finished.add(run)
-            print(f"{run}: {n_done:,} particles", file=sys.stderr)
+        if run not in watches:
+            watches[run] = Watch(bar, run, "particles")
+        watches[run].update(n_done, n_total)
 
     return advance
 

@@ -13,14 +13,13 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rich.markup import escape
-from rich.table import Column, Table
 
 import fast
 import reference
 from conformance import plain
 from conformance.bench import baselines, growth, record, solvers, workloads
 from conformance.bench.growth import FAR, PathFollower, PathPoint, Sensitivity
-from conformance.bench.record import Record, Size, quartiles
+from conformance.bench.record import Record, Size
 from conformance.bench.solvers import Family, Solver, SolverAnswer, SolverRun, by_call, by_command
 from conformance.bench.workloads import FLIGHTS, Workload
 from conformance.cases.certify import Links
@@ -34,7 +33,7 @@ from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from mushrooms import output
 from mushrooms.figures import style
 from mushrooms.reports import bench_page
-from mushrooms.terminal import announce_compilation, new_console, progress_bar, refuse_unheeded
+from mushrooms.terminal import announce_compilation, progress_bar, refuse_unheeded
 from scene import Collision, Scene, State
 from scene.refusal import BadInput
 
@@ -67,10 +66,10 @@ def measure_solvers(
             "bench.html": bench_page.to_html(found, picture),
         }
         write_files(folder, files)
-    console = new_console()
-    console.print(_table(found))
+    for drawn in found.workloads:
+        print(f"{drawn.name}\n\n{bench_page.to_markdown(found, drawn.name)}")
     for name, why in found.not_run.items():
-        console.print(f"not run: {name}: {why}", markup=False)
+        print(f"not run: {name}: {why}")
     print(f"{found.seconds:.0f} s. Report: {folder / 'bench.html'}")
 
 
@@ -152,23 +151,6 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
         except CheckFailure as failure:
             raise BadInput(f"command {command[0]!r} {failure.verdict}: {failure.why}") from None
     return found, built, not_run
-
-
-def _table(found: Record) -> Table:
-    numbers = ("ns/collision", "quartiles", "median ulps", "worst ulps", "wrong", "undecided", "left")
-    table = Table(
-        "workload", Column("stepper", no_wrap=True), title="Speed against error", title_justify="left"
-    )
-    for name in (*numbers, "wrong of further"):
-        table.add_column(name, justify="right")
-    for p in found.points:
-        middle, worst = bench_page.middle_and_worst(p.ulps, ".2g")
-        counts = [str(n) if n else "" for n in (p.wrong, p.undecided, p.left)]
-        first, ns, third = quartiles(p.ns)
-        spread = f"-{1 - first / ns:.1%} +{third / ns - 1:.1%}"
-        row = [escape(p.solver), f"{ns:,.0f}", spread, middle, worst, *counts, bench_page.astray(p)]
-        table.add_row(p.workload, *row)
-    return table
 
 
 DIGITS = (15, 30, 50, 100, 200)

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import secrets
 import shlex
-import sys
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import Progress
-from rich.table import Table
+from rich.table import Column, Table
 
 from conformance import suite
 from conformance.files import write_file
@@ -23,10 +20,9 @@ from conformance.suite.run import NEW_SEEDS, choose
 from conformance.suite.session import Limits
 from conformance.suite.sheet import Sheet, grade_answers, signed
 from mushrooms import output
-from mushrooms.terminal import new_console, progress_bar, refuse_unheeded
+from mushrooms.terminal import Watch, new_console, progress_bar, refuse_unheeded
 from scene.refusal import BadInput
 
-EVERY = 10.0  # seconds between lines where there is no terminal
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
 MAX_TAUGHT = 5  # of them with what was given and what is certified, or with what was sent
 MAX_SENT = 500  # characters of that, and of a line of standard error
@@ -123,40 +119,25 @@ def _run(
             groups=groups,
             limits=limits,
             known=known,
-            progress=_new_progress(bar),
+            progress=Watch(bar, "check", "cases").update,
         )
-
-
-def _new_progress(bar: Progress) -> Callable[[int, int], None]:
-    """Return what moves a bar on a terminal, and elsewhere writes a line on stderr now and then."""
-    task, last = bar.add_task("cases", total=None), time.monotonic()
-
-    def on_progress(n_done: int, n_total: int) -> None:
-        nonlocal last
-        bar.update(task, completed=n_done, total=n_total)
-        if bar.disable and time.monotonic() - last > EVERY:
-            last = time.monotonic()
-            print(f"{n_done} of {n_total} cases", file=sys.stderr, flush=True)
-
-    return on_progress
 
 
 def show(run: Run) -> None:
     """Print verdicts by group, with every denominator, and what stands against success."""
     groups = [*(reports.summarise(run, group) for group in run.groups()), reports.summarise(run)]
     seen = [verdict for verdict in VERDICTS if verdict == "pass" or groups[-1].counts[verdict]]
-    table = Table("group", "cases", *seen, "worst ulps", "A/B/C", "class", title=_title(run))
-    for column in table.columns[1:]:
-        column.justify = "right"
+    verdicts = [Column(verdict, style=COLOURS.get(verdict, "bold red"), justify="right") for verdict in seen]
+    numbers = [Column(name, justify="right") for name in ("worst ulps", "A/B/C", "class")]
+    table = Table("group", Column("cases", justify="right"), *verdicts, *numbers, title=_title(run))
     for group in groups:
-        cells = [_cell(verdict, group.counts[verdict]) for verdict in seen]
-        worst = "inf" if group.worst_ulps is None else f"{group.worst_ulps:.3g}"
-        table.add_section() if group is groups[-1] else None
-        graded = group.precision != "–"
-        counts = "/".join(map(str, group.classes.values())) if graded else "–"
-        table.add_row(
-            group.group, str(group.cases), *cells, worst if graded else "–", counts, group.precision
-        )
+        counts = [str(group.counts[verdict]) for verdict in seen]
+        graded = ["–", "–"]
+        if group.precision != "–":
+            worst = "inf" if group.worst_ulps is None else f"{group.worst_ulps:.3g}"
+            graded = [worst, "/".join(map(str, group.classes.values()))]
+        row = [group.group, str(group.cases), *counts, *graded, group.precision]
+        table.add_row(*row, end_section=group is groups[-2])
     console = new_console(soft_wrap=True)
     console.print(table)
     if run.speed:
@@ -218,14 +199,10 @@ def _title(run: Run) -> str:
     return escape(f"{name}, level {run.level}, corpus {run.corpus}")
 
 
-def _cell(verdict: str, n: int) -> str:
-    return f"[{COLOURS.get(verdict, 'bold red')}]{n}[/]" if n else "[dim]0[/]"
-
-
 def _verdict(run: Run, total: Any) -> str:
     passed = f"{total.counts['pass']} of {total.cases} cases pass"
     restarts = f", {run.n_restarts} restarts" if run.n_restarts else ""
-    doubt = ": the corpus could not on_progress, which is its own fault" if run.exit_code() == 2 else ""
+    doubt = ": the suite itself is at fault" if run.exit_code() == 2 else ""
     return f"{passed}{restarts}, {run.seconds:.1f} s{doubt}."
 
 
@@ -261,7 +238,7 @@ def grade_file(answers: Path, questions: Path | None, level: str, seed: int | No
         answers: the file, or a folder of CSV files.
         questions: what they answer, where the key is beside it; else the fresh questions are proved anew.
         level: of the questions, where nothing else tells.
-        seed: likewise; None where the answers on_progress it.
+        seed: likewise; None where the answers tell it.
 
     Raises:
         BadInput: in one line.

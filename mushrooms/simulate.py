@@ -20,10 +20,10 @@ from fast.validation import check_phases
 from mushrooms import compared, output
 from mushrooms.output import locked
 from mushrooms.store import conduct, engines
-from mushrooms.store.progress import RunTally, Watch, careful_note, gain_of, tally_of
+from mushrooms.store.progress import RunTally, careful_note, gain_of, tally_of
 from mushrooms.store.run import StoredRun
 from mushrooms.store.spec import RunSpec
-from mushrooms.terminal import announce_compilation, print_pairs, progress_bar
+from mushrooms.terminal import Watch, announce_compilation, print_pairs, progress_bar
 from scene.refusal import BadInput
 
 Gains = Callable[[], Iterable[Any]]  # returns ln(E/E0) after each cycle, block by block
@@ -49,9 +49,10 @@ class CliArgs(NamedTuple):
         """Return how many threads there are."""
         return self.threads or os.cpu_count() or 1
 
-    def watch(self, bar: Progress, before: RunTally) -> Watch:
+    def watch(self, bar: Progress) -> Callable[[int], None]:
         """Return what shows the progress of the run."""
-        return Watch(bar, self.spec.scene.name or self.scene, self.particles, before)
+        watch = Watch(bar, self.spec.scene.name or self.scene, "particles")
+        return lambda n_done: watch.update(n_done, self.particles)
 
 
 def simulate_scene(
@@ -122,7 +123,7 @@ def _in_memory(arguments: CliArgs) -> tuple[dict[str, Any], Gains]:
             n_cycles=spec.n_cycles,
             seed=spec.seed,
             threads=arguments.threads,
-            progress=arguments.watch(bar, RunTally()).update,
+            progress=arguments.watch(bar),
         )
     with np.errstate(divide="ignore"):
         gains = np.log(found.cycle_energies[found.takes_part()] / spec.energy)
@@ -182,12 +183,10 @@ def _complete(arguments: CliArgs, run: StoredRun) -> None:
     if arguments.dask:
         engine = engines.by_dask(arguments.dask, arguments.threads)
     with announce_compilation(), progress_bar() as bar:
-        watch = arguments.watch(bar, before)
         conduct.complete(
             run,
             engine,
-            watch.update,
-            lambda block: watch.add(block.tally),
+            arguments.watch(bar),
             max_collisions=arguments.max_collisions,
             max_seconds=arguments.max_seconds,
         )

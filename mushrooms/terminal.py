@@ -6,6 +6,7 @@ import json
 import math
 import shutil
 import sys
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -15,6 +16,9 @@ from rich.console import Console
 
 from scene.refusal import BadInput
 
+FIRST, EVERY = 20.0, 60.0  # seconds to the first line, and between lines, where there is no terminal
+CLOCK = time.monotonic
+UNITS = ((1.0, "seconds"), (60.0, "minutes"), (3600.0, "hours"), (86400.0, "days"))
 # The compiled functions that a person waits for, and how long in all; the others take a few seconds.
 SLOW_TO_COMPILE = {
     "careful_step": "about half a minute",
@@ -67,6 +71,41 @@ def progress_bar() -> progress.Progress:
         disable=not console.is_terminal,
         transient=True,
     )
+
+
+class Watch:
+    """Moves a bar on a terminal; elsewhere prints a line on stderr after 20 seconds, and then one a minute.
+
+    Args:
+        bar: see `progress_bar`.
+        name: of the work.
+        unit: what is counted.
+    """
+
+    def __init__(self, bar: progress.Progress, name: str, unit: str) -> None:
+        self._bar, self._name, self._unit = bar, name, unit
+        self._task = bar.add_task(name, total=None)
+        self._begin, self._n_before, self._next = math.nan, 0, math.inf
+
+    def update(self, n_done: int, n_total: int) -> None:
+        """Take note of how many are done; the clock begins with the first call, when all is compiled."""
+        now = CLOCK()
+        if math.isnan(self._begin):
+            self._begin, self._n_before, self._next = now, n_done, now + FIRST
+        self._bar.update(self._task, completed=n_done, total=n_total)
+        if self._bar.disable and now >= self._next:
+            self._next = now + EVERY
+            rate = (n_done - self._n_before) / max(now - self._begin, 1e-9)
+            left = f"{format_duration((n_total - n_done) / rate)} left" if rate else "time left unknown"
+            count = f"{n_done:,} of {n_total:,} {self._unit}"
+            print(f"{self._name}: {count}, {left}", file=sys.stderr, flush=True)
+
+
+def format_duration(seconds: float) -> str:
+    """Return a duration in the unit that suits it."""
+    size, unit = next(u for u in reversed(UNITS) if seconds >= 1.5 * u[0] or u is UNITS[0])
+    n = seconds / size
+    return f"{n:.2g} {unit}" if n < 10 or n > 1e6 else f"{n:.0f} {unit}"
 
 
 def refuse_unheeded(options: Mapping[str, object], why: str) -> None:

@@ -26,7 +26,7 @@ from conformance.suite import run as suite
 from conformance.suite.checks import ensembles
 from conformance.suite.session import Session
 from conformance.suite.symmetry import Transform
-from mushrooms import check
+from mushrooms import terminal
 from scene import State
 
 PYTHON = [sys.executable, str(Path(conformance.__file__).parent / "harness" / "python" / "stepper.py")]
@@ -42,7 +42,7 @@ def _few(monkeypatch):
     monkeypatch.setattr(suite, "choose", lambda *_: found)
     monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
-    monkeypatch.setattr(check, "EVERY", math.inf)
+    monkeypatch.setattr(terminal, "FIRST", math.inf)
 
 
 @pytest.fixture
@@ -138,11 +138,12 @@ def test_reports_of_broken_sessions_are_written_too(call, tmp_path, name):
 
 
 def test_a_piped_run_tells_on_stderr_how_far_it_is(call, monkeypatch):
-    monkeypatch.setattr(check, "EVERY", 0.0)
+    monkeypatch.setattr(terminal, "FIRST", 0.0)
+    monkeypatch.setattr(terminal, "EVERY", 0.0)
     _, _, err = call("--groups", "static-stem", "--", *command("honest"))
     lines = err.splitlines()
     assert len(lines) > 5
-    assert all(re.fullmatch(r"\d+ of \d+ cases", line) for line in lines)
+    assert all(re.fullmatch(r"check: \d+ of \d+ cases, .*(left|unknown)", line) for line in lines)
 
 
 BROKEN = "import sys\nprint('[red]a line before', file=sys.stderr)\nimport no_such_module\n"

@@ -18,14 +18,14 @@ import theory
 from conformance.audit import session
 from conformance.audit.runs import SCENES
 from conformance.files import sealed, unsealed
-from mushrooms import bench, orbits, questions
+from mushrooms import bench, orbits, questions, terminal
 from mushrooms.compared import begins_widest, explain_limit, leans_inward, measured
 from mushrooms.output import LOCK, locked
-from mushrooms.store import conduct, progress
-from mushrooms.store.progress import Gain, RunTally, expected_collisions, gain_of
+from mushrooms.store import conduct
+from mushrooms.store.progress import Gain, expected_collisions, gain_of
 from mushrooms.store.run import Block, StoredRun
 from mushrooms.store.spec import RunSpec, shape_of
-from mushrooms.terminal import announce_compilation, progress_bar
+from mushrooms.terminal import announce_compilation
 from scene import Fourier, Mushroom, load
 
 RUN = ["simulate", "moving-cap", "--particles", 60, "--energy", 1e4, "--seed", 7, "--threads", 1, "--json"]
@@ -288,17 +288,16 @@ def test_a_block_is_reported_at_once_and_two_are_in_memory(tmp_path, monkeypatch
     assert told == [3, 6, 9, 12, 15, 18]
 
 
-def test_progress_tells_rate_and_losses(capsys, monkeypatch):
-    now = iter(range(0, 10**6, 50))
-    monkeypatch.setattr(progress, "CLOCK", lambda: float(next(now)))
-    with progress_bar() as bar:
-        seen = progress.Watch(bar, "run", 2000, RunTally(particles=500, followed=500))
-        seen.update(500)
-        seen.add(RunTally(particles=500, followed=498, undecided=1, collisions=10**6))
-        seen.update(1000)
-    lines = capsys.readouterr().err.splitlines()
-    assert "run: 1,000 of 2,000 particles," in lines[-1]
-    assert all(word in lines[-1] for word in (" left, ", " particles/s, ", "2 lost", "1 undecided"))
+def test_progress_tells_the_time_left(capsys, monkeypatch):
+    """From the first call on: what was there before took no time."""
+    now = iter(range(0, 10**6, 60))
+    monkeypatch.setattr(terminal, "CLOCK", lambda: float(next(now)))
+    with terminal.progress_bar() as bar:
+        watch = terminal.Watch(bar, "run", "particles")
+        for n_done in (500, 1000, 1500):
+            watch.update(n_done, 2000)
+    told = "run: 1,000 of 2,000 particles, 2 minutes left\nrun: 1,500 of 2,000 particles, 60 seconds left\n"
+    assert capsys.readouterr().err == told
 
 
 def test_a_full_disk_is_told_of_the_folder_that_was_to_be_held(tmp_path, monkeypatch):

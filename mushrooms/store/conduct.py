@@ -18,7 +18,7 @@ import numpy as np
 
 from mushrooms.store.engines import Engine, follow
 from mushrooms.store.progress import expected_collisions
-from mushrooms.store.run import Block, BlockRange, StoredRun, attributes_of, is_run
+from mushrooms.store.run import BlockRange, StoredRun, attributes_of, is_run
 from mushrooms.store.spec import Arrays, RunSpec, difference, made_by, shape_of
 from scene.refusal import BadInput
 
@@ -125,7 +125,6 @@ def complete(
     run: StoredRun,
     engine: Engine,
     on_progress: Callable[[int], None],
-    on_block: Callable[[Block], None] = lambda _block: None,
     *,
     n_particles: int | None = None,
     max_collisions: int | None = None,
@@ -140,7 +139,6 @@ def complete(
         run: to be completed so far; what is missing beyond stays as it is.
         engine: that follows.
         on_progress: called with the number of finished particles, again and again.
-        on_block: called with each block, before it is kept.
         n_particles: how many of the first particles; by default all.
         max_collisions: of a particle: stop if one makes more.
         max_seconds: on the clock: stop after them.
@@ -169,7 +167,6 @@ def complete(
                 under_way.result()
             under_way = writer.submit(run.keep, block_range, block)
             there += block_range.n
-            on_block(block)
             on_progress(max(0, there))
         if under_way is not None:
             under_way.result()

@@ -1,17 +1,14 @@
-"""Counts of the particles of a run, the mean of log E / E0, collisions to expect, and progress."""
+"""Counts of the particles of a run, the mean of log E / E0, and how many collisions to expect."""
 
 from __future__ import annotations
 
 import math
-import sys
-import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from mpmath import fp
-from rich.progress import Progress
 
 import theory
 from fast.ensemble import FOLLOWED, UNDECIDED
@@ -95,68 +92,8 @@ def gain_of(gains: Callable[[], Iterable[npt.NDArray[np.float64]]]) -> Gain:
     return Gain(n, mean, math.sqrt(squares / (n - 1) / n) if n > 1 else None)
 
 
-WIDE = 110  # columns of a terminal that leave room for rates beside the bar
-FIRST, EVERY = 20.0, 60.0  # seconds to the first line, and between lines, where there is no terminal
-CLOCK = time.monotonic
-
-
-class Watch:
-    """Moves a bar on a terminal; elsewhere prints a line on stderr after 20 seconds, and then one a minute.
-
-    Args:
-        bar: begun; see `mushrooms.terminal.progress_bar`.
-        name: of the run.
-        n_particles: in all.
-        before: of the particles that were finished before.
-    """
-
-    def __init__(self, bar: Progress, name: str, n_particles: int, before: RunTally) -> None:
-        self._bar, self._name, self._n, self._before, self._all = bar, name, n_particles, before, before
-        self._done, self._begin = before.particles, math.nan
-        self._task = bar.add_task(name, total=n_particles, completed=self._done)
-
-    def update(self, n_done: int) -> None:
-        """Take note of how many particles are finished."""
-        if math.isnan(self._begin):  # all is checked and compiled
-            self._begin = CLOCK()
-            self._next = self._begin + FIRST
-        self._done = n_done
-        wide = self._bar.console.width >= WIDE
-        self._bar.update(
-            self._task, completed=n_done, description=f"{self._name}\n{self._pace()}" if wide else self._name
-        )
-        if self._bar.disable and CLOCK() > self._next:
-            self._next = CLOCK() + EVERY
-            print(f"{self._name}: {self._text()}", file=sys.stderr, flush=True)
-
-    def add(self, tally: RunTally) -> None:
-        """Take note of a finished block."""
-        self._all = self._all.merged(tally)
-
-    def _text(self) -> str:
-        left, rate = self._n - self._done, self._rate()
-        left_in_words = format_duration(left / rate) + " left" if rate else "time left unknown"
-        return f"{self._done:,} of {self._n:,} particles, {left_in_words}, {self._pace()}"
-
-    def _pace(self) -> str:
-        lost = self._all.particles - self._all.followed
-        return f"{self._rate():.3g} particles/s, {lost} lost, {self._all.undecided} undecided"
-
-    def _rate(self) -> float:
-        """Return how many particles a second have been followed here."""
-        return (self._done - self._before.particles) / max(CLOCK() - self._begin, 1e-9)
-
-
 MOST_CYCLES = 300  # after which particles that grow faster stay fast enough for any run never to end
 CAREFUL_COST = 50  # collisions in lanes that take as long as one careful step, measured at 40 to 80
-UNITS = ((1.0, "seconds"), (60.0, "minutes"), (3600.0, "hours"), (86400.0, "days"))
-
-
-def format_duration(seconds: float) -> str:
-    """Return a duration in the unit that suits it."""
-    size, unit = next(u for u in reversed(UNITS) if seconds >= 1.5 * u[0] or u is UNITS[0])
-    n = seconds / size
-    return f"{n:.2g} {unit}" if n < 10 or n > 1e6 else f"{n:.0f} {unit}"
 
 
 def expected_collisions(scene: Scene, energy: float, n_cycles: int) -> float:

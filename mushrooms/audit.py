@@ -110,35 +110,19 @@ def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -
     if settings.resume:
         wanted = {claim.id for claim in claims} | session.kept(settings)
         claims = tuple(claim for claim in all_claims() if claim.id in wanted)
-        _check_report(folder, wanted)
-    runs = KeptRuns(folder, settings.resume)
-    runs.check(needed(claims, settings.size), settings.seed)
+    check_runs(folder, needed(claims, settings.size), settings.seed, settings.resume)
     try:
         with announce_compilation(), progress_bar() as bar:
             return session.conduct(
                 AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
                 settings,
                 claims=claims,
-                simulate_run=runs.simulate,
+                simulate_run=lambda name: partial(follow_run, folder / FOLDER / name, settings.resume),
                 progress=_watch_runs(bar),
             )
     except KeyboardInterrupt as error:
         error.add_note("finished parts are in the folder of the report: --resume continues the audit")
         raise
-
-
-def _check_report(folder: Path, wanted: set[str]) -> None:
-    """Refuse to replace a report by one that has fewer claims, as other settings would."""
-    try:
-        report = json.loads((folder / "report.json").read_text("utf-8"))
-        there = {finding["id"] for finding in report["findings"]}
-    except (OSError, ValueError, KeyError, TypeError):  # there is no report that could be lost
-        return
-    if there - wanted:
-        raise BadInput(
-            f"output {str(folder)!r} has a report of {len(there)} claims, size = {report.get('size')!r} and"
-            f" seed = {report.get('seed')}; {len(wanted)} are asked for: with --resume none is given up"
-        )
 
 
 def _watch_runs(bar: progress.Progress) -> Callable[[str, int, int], None]:
@@ -172,64 +156,57 @@ def command(run: Simulation, size: Size, seed: int, folder: Path) -> str:
     return spec_of(run, seed).command(run.scene, run.n_particles(size), folder / FOLDER / run.name)
 
 
-class KeptRuns:
-    """Runs in the folder of an audit.
+def check_runs(folder: Path, runs: Sequence[Simulation], seed: int, resume: bool) -> None:
+    """Refuse at once what would be refused when its turn has come.
 
     Args:
         folder: of the audit, held by the caller.
+        runs: that are to be followed there.
+        seed: of the audit.
         resume: whether runs that are there may be gone on with.
+
+    Raises:
+        BadInput: the folder of one of these runs holds another, or this one and `resume` was not
+            asked for, or another process writes in it.
     """
+    for run in runs:
+        place = folder / FOLDER / run.name
+        if is_run(place):
+            with locked(place):
+                conduct.read_description(place, spec_of(run, seed), {})
+            if not resume:
+                how = "--resume takes it up, another --out begins anew"
+                raise BadInput(f"output {str(place)!r} holds a run of this audit: {how}")
 
-    def __init__(self, folder: Path, resume: bool) -> None:
-        self._folder, self._resume = folder / FOLDER, resume
 
-    def check(self, runs: Sequence[Simulation], seed: int) -> None:
-        """Refuse at once what would be refused when its turn has come.
-
-        Raises:
-            BadInput: the folder of one of these runs holds another, or this one and `resume` was not
-                asked for, or another process writes in it.
-        """
-        for run in runs:
-            place = self._folder / run.name
-            if is_run(place):
-                with locked(place):
-                    conduct.read_description(place, spec_of(run, seed), {})
-                if not self._resume:
-                    how = "--resume takes it up, another --out begins anew"
-                    raise BadInput(f"output {str(place)!r} holds a run of this audit: {how}")
-
-    def simulate(self, name: str) -> Callable[..., Ensemble]:
-        """Return what stands for `fast.simulate` in a run: it follows only what the run's folder lacks."""
-        return partial(self._simulate, self._folder / name)
-
-    def _simulate(
-        self,
-        place: Path,
-        scene: Scene,
-        *,
-        n_particles: int,
-        energy: float,
-        n_cycles: int,
-        seed: int,
-        threads: int | None,
-        phases: tuple[float, ...],
-        progress: Callable[[int], None],
-    ) -> Ensemble:
-        spec = RunSpec(scene, energy, n_cycles, seed, phases)
-        line = spec.command(scene.name, n_particles, place)
-        default = block_size(spec, n_particles, threads or os.cpu_count() or 1)
-        with output.writable_folder(place), locked(place):
-            run, damaged = conduct.open_or_create(
-                place, spec, n_particles, None, default, line, self._resume, at_least=True
-            )
-            tell_damaged(damaged)
-            try:
-                conduct.complete(run, engines.in_process(threads), progress, n_particles=n_particles)
-            except OSError as error:
-                why = error.strerror or error
-                raise BadInput(f"output {str(place)!r}: {why}; --resume takes up what is kept") from None
-            return run.ensemble(n_particles)
+def follow_run(
+    place: Path,
+    resume: bool,
+    scene: Scene,
+    *,
+    n_particles: int,
+    energy: float,
+    n_cycles: int,
+    seed: int,
+    threads: int | None,
+    phases: tuple[float, ...],
+    progress: Callable[[int], None],
+) -> Ensemble:
+    """Return what `fast.simulate` would, and follow only what the run's folder lacks."""
+    spec = RunSpec(scene, energy, n_cycles, seed, phases)
+    line = spec.command(scene.name, n_particles, place)
+    default = block_size(spec, n_particles, threads or os.cpu_count() or 1)
+    with output.writable_folder(place), locked(place):
+        run, damaged = conduct.open_or_create(
+            place, spec, n_particles, None, default, line, resume, at_least=True
+        )
+        tell_damaged(damaged)
+        try:
+            conduct.complete(run, engines.in_process(threads), progress, n_particles=n_particles)
+        except OSError as error:
+            why = error.strerror or error
+            raise BadInput(f"output {str(place)!r}: {why}; --resume takes up what is kept") from None
+        return run.ensemble(n_particles)
 
 
 def block_size(spec: RunSpec, n_particles: int, threads: int) -> int:

@@ -12,7 +12,7 @@ from rich.table import Table
 import scene as scenes
 import theory
 from conformance.audit.runs import SCENES, scene_named
-from mushrooms.store.progress import expected_collisions
+from mushrooms.store.summary import expected_collisions
 from mushrooms.terminal import new_console, print_pairs, progress_bar
 from scene import Scene
 from scene.load import catalogue_text, read_data

@@ -17,12 +17,12 @@ from conformance.audit.runs import scene_named
 from conformance.files import write_file
 from fast.starts import one_cycle
 from fast.validation import check_phases
-from mushrooms import compared, output
+from mushrooms import output
 from mushrooms.output import locked
 from mushrooms.store import conduct, engines
-from mushrooms.store.progress import RunTally, careful_note, gain_of, tally_of
 from mushrooms.store.run import StoredRun
 from mushrooms.store.spec import RunSpec
+from mushrooms.store.summary import RunTally, careful_note, explain_limit, gain_of, measured, tally_of
 from mushrooms.terminal import Watch, announce_compilation, print_pairs, progress_bar
 from scene.refusal import BadInput
 
@@ -97,7 +97,7 @@ def simulate_scene(
             found = stored
     summary, gains = found
     print_pairs(summary, as_json)
-    tell(compared.explain_limit(spec, summary))
+    tell(explain_limit(spec, summary))
     if plot is not None:
         draw_energies(plot, spec, iter(gains()), particles)
     return 0
@@ -203,7 +203,7 @@ def _summary(spec: RunSpec, tally: RunTally, seconds: float, gains: Gains, sha25
         "undecided": tally.undecided,
         "careful": tally.careful,
         "collision_time": flown / tally.met if tally.met else None,
-        **compared.measured(spec, tally.captured, gain_of(gains)),
+        **measured(spec, tally.captured, gain_of(gains)),
         "ns_per_collision": seconds / max(tally.collisions, 1) * 1e9,
         "sha256": sha256,
     }

@@ -7,6 +7,7 @@ import os
 import shlex
 import tomllib
 from contextlib import suppress
+from functools import partial
 
 import numpy as np
 import pytest
@@ -56,9 +57,10 @@ def followed(monkeypatch):
 
 def kept(folder, run, size="quick", *, resume=True, seed=SEED):
     """Return a run's sample as an audit in the folder has it."""
-    runs = audit.KeptRuns(folder, resume=resume)
-    runs.check([run], seed)
-    return draw(runs.simulate(run.name), run, size=size, seed=seed, threads=1)
+    audit.check_runs(folder, [run], seed, resume)
+    return draw(
+        partial(audit.follow_run, folder / "runs" / run.name, resume), run, size=size, seed=seed, threads=1
+    )
 
 
 def at_once(run, size="quick"):
@@ -174,12 +176,12 @@ def test_another_run_or_one_in_use_is_refused_before_anything_is_followed(comman
 
 
 def test_a_run_with_more_cycles_is_refused_before_any_is_followed(tmp_path):
-    run, runs = SMALL["cycles"], audit.KeptRuns(tmp_path, resume=True)
+    run = SMALL["cycles"]
     asked = {"energy": run.energy, "seed": run_seed(SEED, run), "phases": run.phases, "threads": 1}
     longer = {"n_particles": 5, "n_cycles": 4, "progress": lambda _: None}
-    runs.simulate(run.name)(scene_of(run), **asked, **longer)
+    audit.follow_run(tmp_path / "runs" / run.name, True, scene_of(run), **asked, **longer)
     with pytest.raises(BadInput, match="cycles = 4 there, 3 asked for: a run only grows"):
-        runs.check([run], SEED)
+        audit.check_runs(tmp_path, [run], SEED, True)
 
 
 def test_a_run_is_held_while_the_audit_follows_it(command_line, tmp_path, monkeypatch):

@@ -17,7 +17,7 @@ from zarr.storage import LocalStore
 
 import fast
 from fast.kernel import follow, pools
-from mushrooms import compared
+from mushrooms import simulate
 from mushrooms.store import conduct, engines
 from mushrooms.store import run as stored
 from mushrooms.store.run import StoredRun
@@ -46,8 +46,8 @@ def summary_of(ended):
 @pytest.fixture(autouse=True)
 def _whole_sums(monkeypatch):
     """Leave the theory, which takes seconds, out of the summary."""
-    monkeypatch.setattr(compared, "measured", lambda _spec, n, gain: {"captured": n, **gain._asdict()})
-    monkeypatch.setattr(compared, "explain_limit", lambda _spec, _summary: None)
+    monkeypatch.setattr(simulate, "measured", lambda _spec, n, gain: {"captured": n, **gain._asdict()})
+    monkeypatch.setattr(simulate, "explain_limit", lambda _spec, _summary: None)
 
 
 @pytest.mark.parametrize("name", deep_but(["fermi-ulam", "moving-cap", "breathing-circle"], "moving-cap"))

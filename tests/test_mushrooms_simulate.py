@@ -19,12 +19,19 @@ from conformance.audit import session
 from conformance.audit.runs import SCENES
 from conformance.files import sealed, unsealed
 from mushrooms import bench, orbits, questions, terminal
-from mushrooms.compared import begins_widest, explain_limit, leans_inward, measured
 from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct
-from mushrooms.store.progress import Gain, expected_collisions, gain_of
 from mushrooms.store.run import Block, StoredRun
 from mushrooms.store.spec import RunSpec, shape_of
+from mushrooms.store.summary import (
+    Gain,
+    begins_widest,
+    expected_collisions,
+    explain_limit,
+    gain_of,
+    leans_inward,
+    measured,
+)
 from mushrooms.terminal import announce_compilation
 from scene import Fourier, Mushroom, load
 

@@ -22,9 +22,9 @@ from conformance.files import sealed, unsealed
 from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct, engines
 from mushrooms.store import run as stored
-from mushrooms.store.progress import gain_of
 from mushrooms.store.run import DESCRIPTION, DIGESTED, StoredRun
 from mushrooms.store.spec import SCHEMA, RunSpec, shape_of
+from mushrooms.store.summary import gain_of
 from scene import load
 
 pytestmark = pytest.mark.usefixtures("unsynced")

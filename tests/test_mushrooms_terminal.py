@@ -20,7 +20,7 @@ import theory
 from mushrooms.commands import app
 from mushrooms.figures import table
 from mushrooms.main import INTERRUPTED, run
-from mushrooms.store.progress import expected_collisions
+from mushrooms.store.summary import expected_collisions
 from mushrooms.terminal import new_console, print_pairs
 from scene import BangBang, Mushroom, load
 

@@ -19,10 +19,10 @@ from matplotlib.figure import Figure
 
 import theory
 from fast.validation import check_energy
-from mushrooms.compared import NO_THEORY, begins_widest, known, predicted
 from mushrooms.figures import style as plots
 from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, FloatArray, new_figure
 from mushrooms.store.spec import RunSpec
+from mushrooms.store.summary import NO_THEORY, begins_widest, known, predicted
 from scene import Mushroom, Scene, check_scene
 from scene.refusal import BadInput, shown
 

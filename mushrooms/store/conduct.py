@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from mushrooms.store.engines import Engine, follow
-from mushrooms.store.progress import expected_collisions
 from mushrooms.store.run import BlockRange, StoredRun, attributes_of, is_run
 from mushrooms.store.spec import Arrays, RunSpec, difference, made_by, shape_of
+from mushrooms.store.summary import expected_collisions
 from scene.refusal import BadInput
 
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files

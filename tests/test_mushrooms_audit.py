@@ -6,17 +6,14 @@ import json
 import re
 import shutil
 from functools import partial
-from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import unquote
-from xml.dom import minidom
 
 import jsonschema
-import numpy as np
 import pytest
 from support import adiabatic_particles
 from support.depth import deep_among
 from support.harm import held
+from support.pages import assert_stands_alone
 from support.refusals import assert_refused
 from support.schemas import validator
 
@@ -92,37 +89,17 @@ def test_the_report_meets_its_published_schema(everything):
         validator("report").validate(data)
 
 
-class Links(HTMLParser):
-    def __init__(self):
-        super().__init__()
-        self.sources, self.tags = [], []
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append(tag)
-        self.sources += [value for name, value in attributes if name in ("src", "href", "srcset", "data")]
-
-
 @pytest.mark.parametrize("ids", deep_among([FIGURES, EVERY_FIGURE], EVERY_FIGURE))
 def test_the_page_loads_nothing_from_elsewhere_and_shows_every_figure(everything, ids, monkeypatch):
     monkeypatch.setattr(by_claim, "ALL", [each for each in by_claim.ALL if each.claim in ids])
     page = audit_page.to_html(audit_page.to_data(everything), samples_of(by_claim.ALL))
-    links = Links()
-    links.feed(page)
-    pictures = [source for source in links.sources if not source.startswith("#")]
-    pictures.remove(audit_page.PAPER)  # the one thing elsewhere, a link to follow
+    pictures = assert_stands_alone(page, links=[audit_page.PAPER])
     assert len(pictures) == len(by_claim.ALL) + 1  # and the first screen's
-    assert not {"script", "link", "iframe", "object"} & set(links.tags)
     assert "http" not in re.sub('src="data:[^"]*"', "", page).replace(audit_page.PAPER, "")
     assert len(page) < 1.2e6
     assert "The main numbers" in page
     assert "n = 5 &lt;b&gt;&amp;" in page
-    for source in pictures:
-        kind, _, picture = unquote(source).partition(",")
-        assert kind == "data:image/svg+xml"
-        minidom.parseString(picture)
-        assert not re.search(r"peak 0\.\d{0,3} wide", picture)  # numbers to read are not cut
-        targets = re.findall(r'href="([^"]*)"', picture)
-        assert all(target.startswith(("#", "data:")) for target in targets)
+    assert not any(re.search(r"peak 0\.\d{0,3} wide", picture) for picture in pictures)  # numbers are not cut
     for claim in everything.claims:
         assert f'id="{claim.id}"' in page
 
@@ -201,7 +178,8 @@ def test_another_seed_is_refused_and_broken_findings_are_made_again(call, tmp_pa
     assert_refused(refused, "holds another run: seed = ", " there, ", "asked for", "ergodic@1e7")
     assert held(tmp_path) == before
     for path in (tmp_path / "findings").iterdir():
-        path.write_bytes(path.read_bytes()[:100])
+        content = path.read_bytes()
+        path.write_bytes(content[:90] + bytes([content[90] ^ 1]) + content[91:])
     assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
     assert len(blocks) == 6
 
@@ -284,12 +262,6 @@ def test_resumed_with_other_claims_a_report_has_both(call, tmp_path, blocks):
     assert len(blocks) == 6
 
 
-@pytest.mark.parametrize(("only", "words"), [("", "empty"), (" ", "empty"), (",,", "must name a claim")])
-def test_no_claim_at_all_is_refused(call, tmp_path, only, words):
-    assert_refused(call("--only", only, "--out", tmp_path / "a"), "--only ", words)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_one_audit_or_run_holds_a_folder(call, command_line, tmp_path):
     with locked(tmp_path):
         assert_refused(call("--only", "M3", "--out", tmp_path), "one run at a time")
@@ -297,26 +269,6 @@ def test_one_audit_or_run_holds_a_folder(call, command_line, tmp_path):
     with locked(tmp_path):
         assert_refused(command_line(*simulate), "one run at a time")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_part_with_a_flipped_bit_is_not_taken_up(call, tmp_path, blocks):
-    """Wherever it is: in numbers, names or a finding's text."""
-    call("--only", "X5", "--out", tmp_path)
-    fresh = json.loads((tmp_path / "report.json").read_text("utf-8"))
-    random = np.random.default_rng(4)
-    for path in sorted(tmp_path.rglob("*")):
-        is_chunk = path.is_file() and "/c/0" in path.as_posix()
-        if is_chunk or path.suffix == ".finding" or path.name.startswith("2."):  # or a block's marker
-            content = bytearray(path.read_bytes())
-            content[random.integers(len(content))] ^= 1 << int(random.integers(8))
-            path.write_bytes(content)
-    ended = call("--only", "X5", "--out", tmp_path, "--resume")
-    assert ended.code == 0
-    assert ended.err.count("damaged or broken off: 2 blocks (0, 2), followed again") == 2
-    assert len(blocks) == 6 + 4
-    again = json.loads((tmp_path / "report.json").read_text("utf-8"))
-    for name in ("name", "seed", "sha256", "m1"):
-        assert [run[name] for run in again["runs"]] == [run[name] for run in fresh["runs"]]
 
 
 def test_without_resume_no_run_is_replaced(call, tmp_path, blocks):

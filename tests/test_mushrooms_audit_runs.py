@@ -6,14 +6,12 @@ import json
 import os
 import shlex
 import tomllib
-from contextlib import suppress
 from functools import partial
 
 import numpy as np
 import pytest
 import xarray
 from support import adiabatic_particles
-from support.harm import harmed
 from support.refusals import assert_refused
 
 import fast
@@ -127,34 +125,6 @@ def test_of_a_larger_run_only_what_the_audit_needs_is_followed(command_line, tmp
     assert followed[1:] == [(192, 64)]
 
 
-def test_whatever_happens_to_a_kept_run_the_audit_sees_the_same_bits(tmp_path, monkeypatch):
-    """It is broken off, harmed and widened at random."""
-    random, keep, left = np.random.default_rng(23), StoredRun.keep, 0
-    run = SMALL["breathing"]
-    wanted = {size: at_once(run, size) for size in ("quick", "full")}
-
-    def sometimes(self, block_range, block):
-        nonlocal left
-        left -= 1
-        if left < 0:
-            raise [KeyboardInterrupt, OSError(5, "input/output error")][random.integers(2)]
-        keep(self, block_range, block)
-
-    monkeypatch.setattr(StoredRun, "keep", sometimes)
-    for number in range(3):
-        folder, size = tmp_path / str(number), "quick"
-        folder.mkdir()
-        for _ in range(5):
-            left = int(random.integers(0, 5))
-            size = "full" if random.random() < 0.3 else "quick"
-            with suppress(KeyboardInterrupt, BadInput):
-                assert_same(kept(folder, run, size), wanted[size])
-            if any(folder.rglob("*.*")):
-                harmed(folder, random)
-        left = 10**6
-        assert_same(kept(folder, run, "full"), wanted["full"])
-
-
 def test_another_run_or_one_in_use_is_refused_before_anything_is_followed(command_line, tmp_path, followed):
     run = SMALL["mouth"]
     made(command_line, run, tmp_path, N_QUICK)
@@ -250,34 +220,6 @@ def test_the_audit_s_scenes_are_known_by_name(command_line, tmp_path, name):
     assert scenes.load(path) == SCENES[name]
 
 
-def test_energies_at_phases_are_kept_drawn_and_exported(command_line, tmp_path):
-    phases = (0.25, 0.5)
-    wanted = fast.simulate(
-        scenes.load("moving-cap"), n_particles=90, energy=60.0, seed=SEED, n_cycles=2, phases=phases
-    )
-    run = ["simulate", "moving-cap", "--particles", 90, "--energy", 60, "--seed", SEED, "--cycles", 2]
-    run += ["--out", tmp_path / "run", "--block", 64, "--json"]
-    ended = command_line(*run, "--phases", "0.25,0.5")
-    assert json.loads(ended.out)["sha256"] == wanted.sha256()
-    with xarray.open_zarr(tmp_path / "run" / "ensemble.zarr") as found:
-        assert found.attrs["phases"] == list(phases)
-        for name in ("phase_energies", "phase_captured"):
-            assert found[name].dims == ("particle", "cycle", "phase")
-            np.testing.assert_array_equal(found[name].values, getattr(wanted, name))
-        assert found.phase_captured.dtype == np.int8
-    assert command_line("draw", tmp_path / "run", "--out", tmp_path / "a.svg").code == 0
-    assert (tmp_path / "a.svg").stat().st_size > 5000
-    assert command_line("export", tmp_path / "run", "--to", tmp_path / "a.npz").code == 0
-    with np.load(tmp_path / "a.npz") as arrays:
-        np.testing.assert_array_equal(arrays["phase_captured"], wanted.phase_captured)
-        assert arrays["phase_captured"].dtype == bool
-    assert command_line("export", tmp_path / "run", "--to", tmp_path / "a.csv").code == 0
-    assert "phase_energies_2_1,phase_energies_2_2,phase_captured_1_1" in (tmp_path / "a.csv").read_text()
-    for other, there in (([], "[]"), (["--phases", "0.25"], "[0.25]")):
-        refused = command_line(*run, "--resume", *other)
-        assert_refused(refused, f"phases = [0.25, 0.5] there, {there} asked for")
-
-
 def test_what_is_not_there_yet_has_no_phase(tmp_path):
     """A run of three blocks of which only the second is kept."""
     spec = audit.spec_of(SMALL["mouth"], SEED)
@@ -299,13 +241,6 @@ def test_without_phases_a_run_says_what_it_always_said(tmp_path):
     assert "phases" not in attributes_of(place)
     assert "phases" not in audit.spec_of(run, SEED).to_data()  # nor in what markers are held to
     assert not list(place.rglob("phase*"))
-
-
-@pytest.mark.parametrize("phases", ["", "a", "0.5,0.25", "0", "0.5,1", "0.5,", "nan", "0.5;0.6"])
-def test_phases_that_are_none_are_refused(command_line, tmp_path, phases):
-    run = ["simulate", "moving-cap", "--particles", 5, "--energy", 1, "--phases", phases]
-    assert_refused(command_line(*run, "--out", tmp_path / "a"), "--phases ")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_stand_in_s_particles_depend_on_their_numbers_alone():

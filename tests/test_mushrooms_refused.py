@@ -88,6 +88,14 @@ REFUSED: list[Any] = [
     ("simulate moving-cap --energy 1", ["--particles"]),
     ("scenes --toml", ["--toml needs NAME"]),
     ("audit --only X2,X99", ["X99", "M1", "L7"]),
+    *(
+        (f"audit --only '{ids}'", ["--only ", why])
+        for ids, why in (("", "empty"), (" ", "empty"), (",,", "name a claim"))
+    ),
+    *(
+        (f"{ONE} --out a --phases '{phases}'", ["--phases "])
+        for phases in ("", "a", "0.5,0.25", "0", "0.5,1", "0.5,", "nan", "0.5;0.6")
+    ),
     ("attack --family none", ["--family = 'none'", "knot-at-event"]),
     ("bench --quick -- ./no-such-stepper", ["no-such-stepper"]),
     pytest.param(f"bench --quick -- {sys.executable} -c 'print(1)'", ["python"], marks=pytest.mark.deep),

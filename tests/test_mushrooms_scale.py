@@ -18,6 +18,7 @@ import distributed
 import numpy as np
 import pytest
 import xarray
+from pyarrow import parquet
 from support.depth import deep_but
 from support.refusals import assert_refused
 
@@ -40,10 +41,10 @@ def ensemble():
 
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory):
-    """Return the folder of a run."""
+    """Return the folder of a run that keeps energies at phases too."""
     folder = tmp_path_factory.mktemp("stored") / "run"
     with pytest.raises(SystemExit, match="0"):
-        run([*map(str, RUN), "--out", str(folder), "--block", "64"])
+        run([*map(str, RUN), "--out", str(folder), "--block", "64", "--phases", "0.25,0.5"])
     return folder
 
 
@@ -164,22 +165,24 @@ def test_no_scheduler_is_one_line(capsys, tmp_path, monkeypatch, address):
 def test_xarray_reads_names_and_what_was_run(stored):
     """The bits: test_mushrooms_lengthen.py."""
     run = xarray.open_zarr(stored / "ensemble.zarr")
-    assert dict(run.sizes) == {"particle": N, "cycle": 1, "narrowing": 1, "wall": 5, "row": LANE_ROWS}
+    sizes = {"particle": N, "cycle": 1, "narrowing": 1, "wall": 5, "row": LANE_ROWS, "phase": 2}
+    assert dict(run.sizes) == sizes
+    assert run.phase_captured.dims == ("particle", "cycle", "phase")
+    assert run.attrs["phases"] == [0.25, 0.5]
     assert (run.attrs["seed"], run.attrs["scene"]["name"]) == (SEED, "moving-cap")
     assert "--seed 5" in run.attrs["command"]
     assert set(run.attrs["versions"]) >= {"oscillating-mushrooms", "numpy", "numba", "python"}
 
 
-def test_exports_have_every_bit(command_line, stored, tmp_path, ensemble):
-    from pyarrow import parquet
-
+def test_exports_have_every_bit(command_line, stored, tmp_path):
+    phases = (0.25, 0.5)
+    ensemble = fast.simulate(load("moving-cap"), n_particles=N, energy=ENERGY, seed=SEED, phases=phases)
     for kind in ("csv", "parquet", "npz"):
         ended = command_line("export", stored, "--to", tmp_path / f"run.{kind}")
         assert (ended.code, ended.err) == (0, "")
     with np.load(tmp_path / "run.npz") as arrays:
         for name in ensemble._fields[:-2]:
-            if not name.startswith("phase_"):
-                assert arrays[name].tobytes() == np.asarray(getattr(ensemble, name)).tobytes()
+            assert arrays[name].tobytes() == np.asarray(getattr(ensemble, name)).tobytes()
     table = parquet.read_table(tmp_path / "run.parquet")
     with (tmp_path / "run.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -188,6 +191,7 @@ def test_exports_have_every_bit(command_line, stored, tmp_path, ensemble):
     for name, wanted in (("cycle_energies_1", ensemble.energy), ("t_in_1_1", ensemble.t_in[:, 0, 0])):
         assert table[name].to_numpy().tobytes() == wanted.tobytes()
         assert np.array([float(row[name]) for row in rows]).tobytes() == wanted.tobytes()
+    assert [int(row["phase_captured_1_2"]) for row in rows] == ensemble.phase_captured[:, 0, 1].tolist()
     assert [int(row["wall_counts_floor"]) for row in rows] == ensemble.wall_counts[:, 4].tolist()
     assert table["particle"].to_pylist() == list(range(N))
 

@@ -37,6 +37,8 @@ LONGEST = [
     "test_theory_valleys.py",
     "test_mushrooms_audit.py",
     "test_mushrooms_bench.py",
+    "test_mushrooms_main.py",
+    "test_mushrooms_store.py",
     "test_fast_lane_search.py",
     "test_mushrooms_check.py",
     "test_conformance_generated.py",

@@ -163,7 +163,7 @@ def test_no_scheduler_is_one_line(capsys, tmp_path, monkeypatch, address):
 
 
 def test_xarray_reads_names_and_what_was_run(stored):
-    """The bits: test_mushrooms_lengthen.py."""
+    """The bits: test_mushrooms_store.py."""
     run = xarray.open_zarr(stored / "ensemble.zarr")
     sizes = {"particle": N, "cycle": 1, "narrowing": 1, "wall": 5, "row": LANE_ROWS, "phase": 2}
     assert dict(run.sizes) == sizes

@@ -26,7 +26,6 @@ from mushrooms import output
 from mushrooms.audit_ensemble import Options, audit_ensemble
 from mushrooms.output import locked
 from mushrooms.reports import audit_page
-from mushrooms.simulate import tell_damaged
 from mushrooms.store import conduct, engines
 from mushrooms.store.run import is_run
 from mushrooms.store.spec import RunSpec
@@ -197,10 +196,7 @@ def follow_run(
     line = spec.command(scene.name, n_particles, place)
     default = block_size(spec, n_particles, threads or os.cpu_count() or 1)
     with output.writable_folder(place), locked(place):
-        run, damaged = conduct.open_or_create(
-            place, spec, n_particles, None, default, line, resume, at_least=True
-        )
-        tell_damaged(damaged)
+        run = conduct.open_or_create(place, spec, n_particles, None, default, line, resume, at_least=True)
         try:
             conduct.complete(run, engines.in_process(threads), progress, n_particles=n_particles)
         except OSError as error:

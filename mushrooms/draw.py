@@ -95,8 +95,7 @@ def draw_scene(
         return
     scene = scene_named(name)
     _check_heeded(kinds, export, options)
-    if export is not None:
-        output.check_file(export, tuple(output.TABLES))
+    output.check_file(export, tuple(output.TABLES))
     paths: dict[str, Path] = {}
     if kinds or export is None or out is not None:
         _check_drawable(scene)

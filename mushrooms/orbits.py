@@ -283,7 +283,7 @@ class Slot(NamedTuple):
     end: float
 
 
-class Stretch(NamedTuple):
+class _Stretch(NamedTuple):
     """A wall, or its part beside the mouth, from one end to the other, anticlockwise."""
 
     wall: Wall
@@ -302,20 +302,20 @@ class Stretch(NamedTuple):
         return min(math.dist(self.begin, (x, y)) / (self.length or 1.0), 1.0)
 
 
-def _stretches(now: TableAt) -> list[Stretch]:
+def _stretches(now: TableAt) -> list[_Stretch]:
     """Return the walls anticlockwise from the right end of the cap."""
     r, w, foot, h = map(float, (now.r, now.w, now.half_width(-now.h), now.h))
     stem = [
-        Stretch("left", (-w, 0.0), (-foot, -h)),
-        Stretch("floor", (-foot, -h), (foot, -h)),
-        Stretch("right", (foot, -h), (w, 0.0)),
+        _Stretch("left", (-w, 0.0), (-foot, -h)),
+        _Stretch("floor", (-foot, -h), (foot, -h)),
+        _Stretch("right", (foot, -h), (w, 0.0)),
     ]
     if isinstance(now.scene, Stem):
-        return [Stretch("base", (w, 0.0), (-w, 0.0)), *stem]
-    arc = Stretch("arc", (r, 0.0), (-r, 0.0))
+        return [_Stretch("base", (w, 0.0), (-w, 0.0)), *stem]
+    arc = _Stretch("arc", (r, 0.0), (-r, 0.0))
     if isinstance(now.scene, scenes.Cap):
-        return [arc, Stretch("base", (-r, 0.0), (r, 0.0))]
-    return [arc, Stretch("base", (-r, 0.0), (-w, 0.0)), *stem, Stretch("base", (w, 0.0), (r, 0.0))]
+        return [arc, _Stretch("base", (-r, 0.0), (r, 0.0))]
+    return [arc, _Stretch("base", (-r, 0.0), (-w, 0.0)), *stem, _Stretch("base", (w, 0.0), (r, 0.0))]
 
 
 def boundary(scene: Scene) -> list[Slot]:

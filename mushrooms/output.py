@@ -99,12 +99,14 @@ def _hold(file: TextIO) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def check_file(path: Path, suffixes: tuple[str, ...]) -> None:
-    """Prove that a file of one of these kinds can be written at `path`.
+def check_file(path: Path | None, suffixes: tuple[str, ...]) -> None:
+    """Prove that a file of one of these kinds can be written at `path`, if one is asked for.
 
     Raises:
         BadInput: one line naming the path and what is wrong with it.
     """
+    if path is None:
+        return
     if path.suffix not in suffixes:
         raise BadInput(f"output {str(path)!r}: its ending must be one of {', '.join(suffixes)}")
     if path.is_dir():

@@ -59,15 +59,15 @@ def ask_case(case: str, command: list[str] | None, seed: int | None, as_json: bo
 
 
 def _find(case: str, seed: int | None) -> Vector:
-    if seed is None and case.startswith("fresh/"):
+    known = {vector.id: vector for vector in vectors.load("stress")}
+    if case in known:
+        return known[case]
+    fresh = {f"fresh/{number}": number for number in range(1, max(N_FRESH.values()) + 1)}
+    if case not in fresh:
+        raise BadInput(f"ID = {case!r}, must be a vector's, such as {next(iter(known))}")
+    if seed is None:
         raise BadInput(f"ID = {case!r} is of one run's questions: give the run's --seed")
-    known = vectors.load("stress")
-    found = {vector.id: vector for vector in known}
-    if seed is not None and case in {f"fresh/{number}" for number in range(1, max(N_FRESH.values()) + 1)}:
-        return fresh_one(seed, int(case.removeprefix("fresh/")))
-    if case in found:
-        return found[case]
-    raise BadInput(f"ID = {case!r}, must be a vector's, such as {known[0].id}")
+    return fresh_one(seed, fresh[case])
 
 
 def _show(vector: Vector, transform: Transform) -> None:
@@ -112,8 +112,7 @@ def attack_steppers(family: str, cases: int, seed: int, stepper: str, json_file:
     names = list(FAMILIES) if family == "all" else [family]
     if family != "all" and family not in FAMILIES:
         raise BadInput(f"--family = {family!r}, must be all or one of {', '.join(FAMILIES)}")
-    if json_file is not None:
-        output.check_file(json_file, (".json",))
+    output.check_file(json_file, (".json",))
     with announce_compilation(), progress_bar() as bar:
         task = bar.add_task("attack", total=cases * len(names))
         tallies = run(
@@ -174,8 +173,7 @@ FIELDS = ("t", "x", "y", "vx", "vy")
 
 def verify_file(file: Path, scene: str | None, picture: Path | None) -> int:
     """Judge each step of a trajectory from the state before it, and return the exit code."""
-    if picture is not None:
-        output.check_file(picture, (".svg",))
+    output.check_file(picture, (".svg",))
     text = _read(file, scene)
     verdicts = _judge(file, text)
     for place, status, reason in verdicts:

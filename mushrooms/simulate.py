@@ -140,10 +140,9 @@ def _on_disk(arguments: CliArgs, folder: Path, resume: bool) -> tuple[dict[str, 
     default = conduct.block_of_new(spec, n, arguments.n_threads)
     try:
         with announce_compilation():
-            run, damaged = conduct.open_or_create(folder, spec, n, arguments.block, default, command, resume)
+            run = conduct.open_or_create(folder, spec, n, arguments.block, default, command, resume)
     except OSError as error:
         raise BadInput(f"output {str(folder)!r}: {error.strerror or error}") from None
-    tell_damaged(damaged)
     n_before = run.tally.particles
     try:
         _complete(arguments, run)
@@ -213,13 +212,6 @@ def tell(note: str | None) -> None:
     """Print a note on stderr, if there is one."""
     if note is not None:
         print(note, file=sys.stderr)
-
-
-def tell_damaged(numbers: list[int]) -> None:
-    """Say on stderr which blocks of a run are followed again."""
-    if numbers:
-        few = ", ".join(map(str, numbers[:5])) + (" ..." if len(numbers) > 5 else "")
-        tell(f"damaged or broken off: {len(numbers)} blocks ({few}), followed again")
 
 
 def draw_energies(path: Path, spec: RunSpec, gains: Iterator[Any], n_particles: int) -> None:

@@ -487,7 +487,7 @@ def test_the_audit_s_scenes_are_known_by_name(command_line, tmp_path, name):
 def test_what_is_not_there_yet_has_no_phase(tmp_path):
     """A run of three blocks of which only the second is kept."""
     spec = audit.spec_of(SMALL["mouth"], SEED)
-    run, _ = conduct.open_or_create(tmp_path, spec, 150, 64, 64, "", False)
+    run = conduct.open_or_create(tmp_path, spec, 150, 64, 64, "", False)
     block_range = list(run.missing())[1]
     run.keep(block_range, audit.engines.follow(spec, block_range, 1))
     with xarray.open_zarr(tmp_path / "ensemble.zarr", mask_and_scale=False) as found:

@@ -56,8 +56,7 @@ def chords(scene: Scene, t: float, n: int = N_CHORDS) -> np.ndarray:
     """
     points = np.hstack(walls(scene, t))
     top, bottom = points[1].max(), points[1].min()
-    speed = 1e6 * points[0].max()
-    direction = 0.61  # radians: off every symmetry
+    speed, direction = 1e6 * points[0].max(), 0.61  # radians: off every symmetry
     vx, vy = float(speed * np.cos(direction)), float(speed * np.sin(direction))
     state = State(t, 0.0, float(0.37 * (top or bottom)), vx, vy)
     path = [(state.x, state.y)]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import shutil
+import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -61,8 +62,8 @@ def open_or_create(
     resume: bool,
     *,
     at_least: bool = False,
-) -> tuple[StoredRun, list[int]]:
-    """Return the run of a folder, new or gone on with, and the numbers of the blocks found damaged.
+) -> StoredRun:
+    """Return the run of a folder, new or gone on with; blocks found damaged are told of on stderr.
 
     Args:
         folder: held by the caller.
@@ -98,7 +99,10 @@ def open_or_create(
     _check_disk(run)
     if is_there:
         run.describe()
-    return run, damaged if is_there else []
+        if damaged:
+            few = ", ".join(map(str, damaged[:5])) + (" ..." if len(damaged) > 5 else "")
+            print(f"damaged or broken off: {len(damaged)} blocks ({few}), followed again", file=sys.stderr)
+    return run
 
 
 def read_description(folder: Path, spec: RunSpec, more: dict[str, object]) -> dict[str, Any]:

@@ -40,6 +40,7 @@ from mushrooms.store.spec import (
     RunSpec,
     Shape,
     made_by,
+    paused_of,
     shape_of,
     spec_of,
 )
@@ -308,12 +309,12 @@ class StoredRun:
         Raises:
             BadInput: a block is missing or damaged.
         """
-        n_blocks, fields = -(-n // self.shape.block), dict[str, Any]()
-        for name in DIGESTED:
-            parts = [array for number in range(n_blocks) if (array := self.part(number, name)) is not None]
-            fields[name] = np.concatenate(parts)[:n] if parts else np.zeros((n, self.shape.n_cycles, 0))
+        numbers = range(-(-n // self.shape.block))
+        arrays = {
+            name: np.concatenate([self.read(k, name) for k in numbers])[:n] for name in self.shape.names
+        }
         seconds = self.seconds * n / max(self.tally.particles, 1)
-        return Ensemble(energy0=self.spec.energy, seconds=seconds, threads=1, **fields)
+        return paused_of(arrays, self.spec.energy, seconds).ensemble
 
     def _count(self, marker: Marker, tally: RunTally) -> None:
         self._markers[marker.number] = marker

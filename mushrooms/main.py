@@ -23,7 +23,7 @@ from mushrooms.commands import app
 PROGRAM = "mushrooms"
 # Typer 0.26 carries a click of its own, older ones import it: this is the error class of the one in use.
 UsageError: type[Any] = typer.BadParameter.__bases__[0]
-INTERRUPTED = 130
+REFUSED, INTERRUPTED = 2, 130
 
 
 def run(arguments: list[str] | None = None) -> NoReturn:
@@ -47,26 +47,26 @@ def _call(given: list[str]) -> NoReturn:
     except typer.Exit as stop:
         code = stop.exit_code
     except KeyboardInterrupt as error:
-        code = _tell_interrupted(error)
+        code = _tell(INTERRUPTED, "interrupted", error)
     except BrokenPipeError:
         code = 1  # the reader has gone: nothing to say
     except UsageError as error:
-        code = _refuse(error.format_message())
+        code = _tell(REFUSED, error.format_message())
     except OSError as error:
-        code = _refuse(_format_error(error))
+        code = _tell(REFUSED, _format_error(error), error)
     except EOFError as error:
-        code = _refuse(f"a file or stream ended too soon: {error}")
+        code = _tell(REFUSED, f"a file or stream ended too soon: {error}")
     except BrokenExecutor as error:
-        code = _refuse(f"a process of this run was ended from outside: {error}")
+        code = _tell(REFUSED, f"a process of this run was ended from outside: {error}")
     except (MemoryError, RecursionError) as error:
         what = "not enough memory" if isinstance(error, MemoryError) else "nested too deeply"
-        code = _refuse(f"{what}: {error}".removesuffix(": "))
+        code = _tell(REFUSED, f"{what}: {error}".removesuffix(": "))
     except ValueError as error:
         from scene.refusal import BadInput  # not above: the list of commands needs no scene
 
         if not isinstance(error, BadInput):
             raise
-        code = _refuse(str(error))
+        code = _tell(REFUSED, str(error))
     except (ImportError, SystemError) as error:
         # A compiled module that is loaded when an interrupt comes says that it failed.
         cause: BaseException | None = error
@@ -74,7 +74,7 @@ def _call(given: list[str]) -> NoReturn:
             cause = cause.__cause__ or cause.__context__
         if cause is None:
             raise
-        code = _tell_interrupted(cause)
+        code = _tell(INTERRUPTED, "interrupted", cause)
     sys.exit(code or 0)
 
 
@@ -99,22 +99,12 @@ def _refuse_empty(given: list[str]) -> None:
             raise UsageError(f"{name.rstrip('=')} is empty, must have a value")
 
 
-def _tell_interrupted(error: BaseException) -> int:
-    """Say what is kept of an interrupted command, as its notes tell; return the exit code."""
-    notes = getattr(error, "__notes__", ["files are written only when they are complete"])
-    _tell(f"interrupted; {'; '.join(notes)}")
-    return INTERRUPTED
-
-
-def _refuse(message: str) -> int:
-    """Say in a line why a command is refused; return the exit code."""
-    _tell(" ".join(message.split()))
-    return 2
-
-
-def _tell(message: str) -> None:
+def _tell(code: int, message: str, error: BaseException | None = None) -> int:
+    """Say on stderr in one line how a command ends, with the notes of the error; return the exit code."""
+    text = "; ".join([message, *getattr(error, "__notes__", [])])
     with suppress(OSError):  # standard error may be full, or its terminal gone: the exit code still tells
-        print(f"{PROGRAM}: {message}", file=sys.stderr, flush=True)
+        print(f"{PROGRAM}: {' '.join(text.split())}", file=sys.stderr, flush=True)
+    return code
 
 
 def _format_error(error: OSError) -> str:

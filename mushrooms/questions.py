@@ -189,16 +189,14 @@ def verify_file(file: Path, scene: str | None, picture: Path | None) -> int:
 
 def _read(file: Path, scene: str | None) -> str:
     """Return a trajectory as the verifier takes it: a JSON file as it is, a CSV file as JSON."""
-    try:
-        if file.suffix != ".csv":
-            if scene is not None:
-                raise BadInput(f"--scene = {scene!r} would change nothing here: the JSON file has its scene")
-            return file.read_text("utf-8")
+    if file.suffix == ".csv":
         if scene is None:
             raise BadInput(f"trajectory {str(file)!r}: a CSV file needs --scene")
         return json.dumps(_of_rows(file, scene))
-    except OSError as error:
-        raise BadInput(f"trajectory {str(file)!r} cannot be read: {error.strerror}") from None
+    if scene is not None:
+        raise BadInput(f"--scene = {scene!r} would change nothing here: the JSON file has its scene")
+    try:
+        return file.read_text("utf-8")
     except UnicodeDecodeError as error:
         raise BadInput(f"trajectory {str(file)!r}: {error}") from None
 

@@ -14,7 +14,7 @@ from rich.progress import Progress
 
 import fast
 from conformance.audit.runs import scene_named
-from conformance.files import write_file
+from conformance.files import named, write_file
 from fast.starts import one_cycle
 from fast.validation import check_phases
 from mushrooms import output
@@ -138,29 +138,21 @@ def _on_disk(arguments: CliArgs, folder: Path, resume: bool) -> tuple[dict[str, 
     spec, n = arguments.spec, arguments.particles
     command = spec.command(arguments.scene, n, folder)
     default = conduct.block_of_new(spec, n, arguments.n_threads)
-    try:
-        with announce_compilation():
-            run = conduct.open_or_create(folder, spec, n, arguments.block, default, command, resume)
-    except OSError as error:
-        raise BadInput(f"output {str(folder)!r}: {error.strerror or error}") from None
+    with named(folder), announce_compilation():
+        run = conduct.open_or_create(folder, spec, n, arguments.block, default, command, resume)
     n_before = run.tally.particles
     try:
-        _complete(arguments, run)
-        summary = _summary(spec, run.tally, run.seconds, run.gains, run.sha256())
+        with named(folder):
+            _complete(arguments, run)
+            summary = _summary(spec, run.tally, run.seconds, run.gains, run.sha256())
     except conduct.LimitReached as limit:
         tell(f"{limit}: {_how_to_resume(run, command)}")
         if run.tally.particles == n_before:  # it would stop there again and again
             tell(f"{NO_BLOCK} than {run.shape.block}")
         return None
-    except KeyboardInterrupt as error:
-        is_empty = run.first_there() is None
-        error.add_note("no block was finished: nothing is kept" if is_empty else _how_to_resume(run, command))
+    except (KeyboardInterrupt, OSError) as error:  # of a file, or a connection to a cluster
+        error.add_note(_how_to_resume(run, command))
         raise
-    except ConnectionError as error:  # to a cluster
-        raise BadInput(f"{error}: {_how_to_resume(run, command)}") from None
-    except OSError as error:
-        at = f"output {error.filename or str(folder)!r}: {error.strerror or error}"
-        raise BadInput(f"{at}: {_how_to_resume(run, command)}") from None
     data = spec.to_data()
     kept = {name: data[name] for name in ("scene", "energy", "cycles", "seed")} | summary
     write_file(folder / "summary.json", json.dumps(kept) + "\n")

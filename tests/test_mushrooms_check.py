@@ -323,7 +323,7 @@ def test_a_bad_trajectory_is_refused_in_one_line(content, options, message, tmp_
     path = tmp_path / ("steps.json" if content[0] == "{" else "steps.csv")
     path.write_text(content)
     assert_refused(command_line("verify", path, *options), message)
-    assert_refused(command_line("verify", tmp_path / "none.json"), "cannot be read")
+    assert_refused(command_line("verify", tmp_path / "none.json"), "none.json': No such file")
 
 
 ROOT = Path(__file__).parent.parent

@@ -124,7 +124,7 @@ def test_a_broken_off_simulation_leaves_nothing(command_line, tmp_path, monkeypa
         (RecursionError("maximum depth exceeded"), "nested too deeply: maximum depth exceeded"),
         (BrokenExecutor("no result"), "a process of this run was ended from outside: no result"),
         (OSError(errno.EMFILE, "Too many open files"), "[Errno 24] Too many open files"),
-        (KeyboardInterrupt(), "interrupted; files are written only when they are complete"),
+        (KeyboardInterrupt(), "interrupted"),
     ],
 )
 def test_only_an_interrupt_is_called_one(command_line, monkeypatch, error, told):
@@ -397,7 +397,7 @@ def test_whatever_ends_a_command_no_half_written_file_stays(tmp_path, name, is_f
             env={**BUFFERED, "PYTHONPATH": str(ROOT)},
         )
     assert done.returncode == INTERRUPTED
-    assert is_full or done.stderr == "mushrooms: interrupted; files are written only when they are complete\n"
+    assert is_full or done.stderr == "mushrooms: interrupted\n"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -563,7 +563,7 @@ REFUSED: list[Any] = [
     ("ask fresh/999 --seed 1", ["ID = 'fresh/999'"]),
     ("ask moving-cap/3 -- ./no-such-stepper", ["no-such-stepper"]),
     (f"ask moving-cap/3 -- {shlex.join(command('other-protocol'))}", ["does not speak protocol 1"]),
-    ("verify none.json", ["cannot be read"]),
+    ("verify none.json", ["'none.json': No such file"]),
     # files that cannot be, or of no such kind
     ("draw moving-cap --out picture.jpeg", ["picture.jpeg", ".svg"]),
     ("draw moving-cap --out nowhere/picture.svg", ["nowhere/picture.svg", "No such"]),

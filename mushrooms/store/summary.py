@@ -16,10 +16,8 @@ from fast.starts import one_cycle
 from mushrooms.store.spec import RunSpec
 from scene import Cap, Mushroom, Scene, Stem
 from scene.geometry import table_at
-from scene.laws import values
 from scene.mouth import mouth_minima, start_time
 from scene.refusal import BadInput
-from scene.tables import laws
 
 
 class RunTally(NamedTuple):
@@ -150,7 +148,6 @@ def careful_note(n_careful: int, n_collisions: int, seconds: float) -> str | Non
 
 
 DIGITS = 10  # of the adiabatic theory: a run knows six at most
-N_TIMES = 1025  # of a cycle, at which the sides are looked at
 SAME = 2.0**-40  # of nu: far above rounding, and no particle starts in so thin a part of the island
 NO_THEORY = (BadInput, theory.NotCovered, theory.NotConverged)  # raised where theory covers nothing
 
@@ -218,13 +215,7 @@ def explain_limit(spec: RunSpec, summary: Mapping[str, Any]) -> str | None:
         return None
     if not spec.scene.period:  # nothing moves: energies are what they were, at any energy
         return None
-    note = "m1_theory, p_nc_theory: the limit of high energies; what is left at this one is not known"
-    if not leans_inward(spec.scene):
-        note += (
-            ", and falls slowly (of upright sides the variance as log(E) / sqrt(E)):"
-            " where the slope is not above 0 some flights stay in the stem"
-        )
-    return note
+    return "m1_theory, p_nc_theory: the limit of high energies; what is left at this one is not known"
 
 
 def _explain_narrow_start(scene: Mushroom) -> str:
@@ -237,12 +228,6 @@ def _explain_narrow_start(scene: Mushroom) -> str:
         f" {float(now.w / now.r):.4g} r, not at its widest, {float(widest.nu_max):.4g} r:"
         f" some particles start in the island; shift all laws by {-wait!r} in time, to begin where it is"
     )
-
-
-def leans_inward(scene: Scene) -> bool:
-    """Tell whether the stem narrows downward at all times, so that no flight can stay in it for ever."""
-    times = start_time(scene) + scene.period * np.linspace(0.0, 1.0, N_TIMES)
-    return bool(values(laws(scene)["slope"], times).min() > 0)
 
 
 def _measured_error(scene: Scene, share: float, n: int) -> float:

@@ -32,7 +32,7 @@ from conformance.audit.claims.finite_energy import ACW, CW, ERGODIC, LADDER, fit
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import Mean, mean, share
-from mushrooms.figures.energies import N_PLACES, draw, draw_never_captured, gathered, panels
+from mushrooms.figures.energies import draw, draw_adiabatic, gathered, panels
 from mushrooms.figures.orbits import draw_map, draw_section
 from mushrooms.figures.style import (
     BLACK,
@@ -155,12 +155,7 @@ def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
     bars = gathered(sample.gain, float(found.peak[1] ** 0.5))
     draw(axes, rest, bars, found)
     axes.set_title(f"{sample.run.scene}, E0 = {power(sample.run.energy)}, {sample.n:,} particles")
-    limit = energies_of(sample.run.name)
-    if limit.p_nc < 1:
-        x = np.linspace(bars.edges[0], bars.edges[-1], N_PLACES)
-        sharp = np.diff(limit.captured_below(x)) / np.diff(x)
-        axes.plot((x[1:] + x[:-1]) / 2, sharp, color=ORANGE, linewidth=1.2, label="theory, captured, sharp")
-    draw_never_captured(axes, float(limit.s_nc))
+    draw_adiabatic(axes, energies_of(sample.run.name), bars.edges, "sharp")
 
 
 def capture_times(samples: list[Sample]) -> Figure:

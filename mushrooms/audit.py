@@ -24,12 +24,11 @@ from fast import Ensemble
 from fast.ensemble import SHARE
 from mushrooms import output
 from mushrooms.audit_ensemble import Options, audit_ensemble
-from mushrooms.output import locked
+from mushrooms.output import Watch, announce_compilation, locked, progress_bar, refuse_unheeded
 from mushrooms.reports import audit_page
 from mushrooms.store import conduct, engines
 from mushrooms.store.run import is_run
 from mushrooms.store.spec import RunSpec
-from mushrooms.terminal import Watch, announce_compilation, progress_bar, refuse_unheeded
 from scene import Scene
 from scene.refusal import BadInput
 

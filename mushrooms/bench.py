@@ -32,8 +32,8 @@ from conformance.suite.session import Limits
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from mushrooms import output
 from mushrooms.figures import style
+from mushrooms.output import announce_compilation, progress_bar, refuse_unheeded
 from mushrooms.reports import bench_page
-from mushrooms.terminal import announce_compilation, progress_bar, refuse_unheeded
 from scene import Collision, Scene, State
 from scene.refusal import BadInput
 

@@ -20,7 +20,7 @@ from conformance.suite.run import NEW_SEEDS, choose
 from conformance.suite.session import Limits
 from conformance.suite.sheet import Sheet, grade_answers, signed
 from mushrooms import output
-from mushrooms.terminal import Watch, new_console, progress_bar, refuse_unheeded
+from mushrooms.output import Watch, new_console, progress_bar, refuse_unheeded
 from scene.refusal import BadInput
 
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports

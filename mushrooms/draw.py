@@ -16,9 +16,9 @@ from mushrooms import orbits, output
 from mushrooms.figures import energies, style
 from mushrooms.figures import orbits as pictures
 from mushrooms.figures import table as tables
+from mushrooms.output import announce_compilation, progress_bar, refuse_unheeded
 from mushrooms.simulate import draw_energies
 from mushrooms.store.run import is_run, open_run
-from mushrooms.terminal import announce_compilation, progress_bar, refuse_unheeded
 from scene import Scene, Stem
 from scene.laws import bounds
 from scene.refusal import BadInput

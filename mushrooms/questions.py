@@ -35,7 +35,7 @@ from conformance.suite.symmetry import Transform, draw_transform
 from conformance.vectors import Vector
 from mushrooms import output
 from mushrooms.check import format_outcome
-from mushrooms.terminal import announce_compilation, new_console, progress_bar
+from mushrooms.output import announce_compilation, new_console, progress_bar
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined, from_data
 from scene.refusal import shown
 

@@ -12,8 +12,8 @@ from rich.table import Table
 import scene as scenes
 import theory
 from conformance.audit.runs import SCENES, scene_named
+from mushrooms.output import new_console, print_pairs, progress_bar
 from mushrooms.store.summary import expected_collisions
-from mushrooms.terminal import new_console, print_pairs, progress_bar
 from scene import Scene
 from scene.load import catalogue_text, read_data
 from scene.refusal import BadInput

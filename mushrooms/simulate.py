@@ -18,12 +18,11 @@ from conformance.files import named, write_file
 from fast.starts import one_cycle
 from fast.validation import check_phases
 from mushrooms import output
-from mushrooms.output import locked
+from mushrooms.output import Watch, announce_compilation, locked, print_pairs, progress_bar
 from mushrooms.store import conduct, engines
 from mushrooms.store.run import StoredRun
 from mushrooms.store.spec import RunSpec
 from mushrooms.store.summary import RunTally, careful_note, explain_limit, gain_of, measured, tally_of
-from mushrooms.terminal import Watch, announce_compilation, print_pairs, progress_bar
 from scene.refusal import BadInput
 
 Gains = Callable[[], Iterable[Any]]  # returns ln(E/E0) after each cycle, block by block

@@ -29,7 +29,7 @@ from conformance.suite import run as suite
 from conformance.suite.checks import ensembles
 from conformance.suite.session import Session
 from conformance.suite.symmetry import Transform
-from mushrooms import bench, terminal
+from mushrooms import bench, output
 from mushrooms.reports import bench_page
 from scene import State
 
@@ -46,7 +46,7 @@ def _few(monkeypatch):
     monkeypatch.setattr(suite, "choose", lambda *_: found)
     monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
-    monkeypatch.setattr(terminal, "FIRST", math.inf)
+    monkeypatch.setattr(output, "FIRST", math.inf)
 
 
 @pytest.fixture
@@ -134,8 +134,8 @@ def test_reports_of_broken_sessions_are_written_too(call, tmp_path, name):
 
 
 def test_a_piped_run_tells_on_stderr_how_far_it_is(call, monkeypatch):
-    monkeypatch.setattr(terminal, "FIRST", 0.0)
-    monkeypatch.setattr(terminal, "EVERY", 0.0)
+    monkeypatch.setattr(output, "FIRST", 0.0)
+    monkeypatch.setattr(output, "EVERY", 0.0)
     _, _, err = call("--groups", "static-stem", "--", *command("honest"))
     lines = err.splitlines()
     assert len(lines) > 5

@@ -31,9 +31,9 @@ from mushrooms import scenes as catalogue
 from mushrooms.commands import app
 from mushrooms.figures import table
 from mushrooms.main import INTERRUPTED, run
+from mushrooms.output import new_console, print_pairs
 from mushrooms.scenes import FIGURES
 from mushrooms.store.summary import expected_collisions
-from mushrooms.terminal import new_console, print_pairs
 from scene import BangBang, Mushroom, load
 
 MOVING_CAP = """\

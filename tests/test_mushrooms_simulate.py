@@ -32,9 +32,9 @@ from conformance.audit import session
 from conformance.audit.runs import SCENES
 from conformance.files import sealed, unsealed
 from fast.kernel.follow import LANE_ROWS
-from mushrooms import bench, orbits, questions, terminal
+from mushrooms import bench, orbits, output, questions
 from mushrooms.main import run
-from mushrooms.output import LOCK, locked
+from mushrooms.output import LOCK, announce_compilation, locked
 from mushrooms.store import conduct, engines
 from mushrooms.store.run import DESCRIPTION, GROUP, MARKERS, Block, StoredRun
 from mushrooms.store.spec import RunSpec, shape_of
@@ -46,7 +46,6 @@ from mushrooms.store.summary import (
     gain_of,
     measured,
 )
-from mushrooms.terminal import announce_compilation
 from scene import Fourier, Mushroom, load
 
 IN_MEMORY = [
@@ -316,9 +315,9 @@ def test_a_block_is_reported_at_once_and_two_are_in_memory(tmp_path, monkeypatch
 def test_progress_tells_the_time_left(capsys, monkeypatch):
     """From the first call on: what was there before took no time."""
     now = iter(range(0, 10**6, 60))
-    monkeypatch.setattr(terminal, "CLOCK", lambda: float(next(now)))
-    with terminal.progress_bar() as bar:
-        watch = terminal.Watch(bar, "run", "particles")
+    monkeypatch.setattr(output, "CLOCK", lambda: float(next(now)))
+    with output.progress_bar() as bar:
+        watch = output.Watch(bar, "run", "particles")
         for n_done in (500, 1000, 1500):
             watch.update(n_done, 2000)
     told = "run: 1,000 of 2,000 particles, 2 minutes left\nrun: 1,500 of 2,000 particles, 60 seconds left\n"

@@ -22,15 +22,20 @@ from conformance.audit.session import AuditResult, AuditSettings
 from conformance.files import write_files
 from fast import Ensemble
 from fast.ensemble import SHARE
-from mushrooms import output
 from mushrooms.audit_ensemble import Options, audit_ensemble
-from mushrooms.output import Watch, announce_compilation, locked, progress_bar, refuse_unheeded
+from mushrooms.output import (
+    Watch,
+    announce_compilation,
+    locked,
+    progress_bar,
+    refuse_unheeded,
+    writable_folder,
+)
 from mushrooms.reports import audit_page
 from mushrooms.store import conduct, engines
 from mushrooms.store.run import is_run
 from mushrooms.store.spec import RunSpec
-from scene import Scene
-from scene.refusal import BadInput
+from scene import BadInput, Scene
 
 
 def audit_claims(
@@ -82,7 +87,7 @@ def _audit_paper(
         lines = [command(run, size, seed, out) for run in needed(claims, size)]
         print(json.dumps(lines, indent=2) if as_json else "\n".join(lines))
         return 0
-    with output.writable_folder(out) as folder, locked(folder):
+    with writable_folder(out) as folder, locked(folder):
         settings = AuditSettings(size, seed, threads, folder / "findings", resume)
         # What a killed audit was writing: no other process writes under these names, as the folder is held.
         for path in (*folder.glob(".report.*.part"), *folder.glob("findings/.*.finding.*.part")):
@@ -194,7 +199,7 @@ def follow_run(
     spec = RunSpec(scene, energy, n_cycles, seed, phases)
     line = spec.command(scene.name, n_particles, place)
     default = block_size(spec, n_particles, threads or os.cpu_count() or 1)
-    with output.writable_folder(place), locked(place):
+    with writable_folder(place), locked(place):
         run = conduct.open_or_create(place, spec, n_particles, None, default, line, resume, at_least=True)
         try:
             conduct.complete(run, engines.in_process(threads), progress, n_particles=n_particles)

@@ -30,12 +30,10 @@ from conformance.harness.examples import find_examples
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
-from mushrooms import output
 from mushrooms.figures import style
-from mushrooms.output import announce_compilation, progress_bar, refuse_unheeded
+from mushrooms.output import announce_compilation, progress_bar, refuse_unheeded, writable_folder
 from mushrooms.reports import bench_page
-from scene import Collision, Scene, State
-from scene.refusal import BadInput
+from scene import BadInput, Collision, Scene, State
 
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
 # By size: questions of a workload, steps with walls only, runs, trajectories and their length.
@@ -57,7 +55,7 @@ def measure_solvers(
         return
     refuse_unheeded({"--workload": workload}, "it needs --table")
     size: Size = "quick" if quick else "full"
-    with output.writable_folder(out) as folder, announce_compilation():
+    with writable_folder(out) as folder, announce_compilation():
         found = _measure(size, seed, command)
         picture = style.svg(bench_page.headline(found))
         files: dict[str, bytes | str | Writer] = {

@@ -12,16 +12,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
-from conformance import suite
 from conformance.files import write_file
-from conformance.suite import reports, sheet_files
+from conformance.suite import check, read_known, reports, sheet_files
 from conformance.suite.result import VERDICTS, Run
 from conformance.suite.run import NEW_SEEDS, choose
 from conformance.suite.session import Limits
 from conformance.suite.sheet import Sheet, grade_answers, signed
-from mushrooms import output
-from mushrooms.output import Watch, new_console, progress_bar, refuse_unheeded
-from scene.refusal import BadInput
+from mushrooms.output import Watch, check_file, new_console, progress_bar, refuse_unheeded, writable_folder
+from scene import BadInput
 
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
 MAX_TAUGHT = 5  # of them with what was given and what is certified, or with what was sent
@@ -56,8 +54,18 @@ def check_stepper(
         write_questions(questions, level, seed)
         return 0
     else:
-        limits = Limits(timeout, restarts, total)
-        run = _run(command, level, seed, _names_of(groups), limits, known_failures)
+        names = _names_of(groups)
+        known = read_known(known_failures) if known_failures else frozenset()
+        with progress_bar() as bar:
+            run = check(
+                command,
+                level=level,
+                seed=seed,
+                groups=names,
+                limits=Limits(timeout, restarts, total),
+                known=known,
+                progress=Watch(bar, "check", "cases").update,
+            )
     for path, content in files.items():
         write_file(path, content(run))
     show(run)
@@ -94,33 +102,11 @@ def _report_files(given: Mapping[str, Path | None]) -> dict[Path, Callable[[Run]
     for option, path in given.items():
         if path is not None:
             suffix, content = WRITERS[option]
-            output.check_file(path, (suffix,))
+            check_file(path, (suffix,))
             if path in files:
                 raise BadInput(f"output {str(path)!r} is asked for twice, must be a file for each report")
             files[path] = content
     return files
-
-
-def _run(
-    command: list[str],
-    level: str,
-    seed: int | None,
-    groups: list[str],
-    limits: Limits,
-    known_failures: Path | None,
-) -> Run:
-    """Run the suite on a command, with its progress shown."""
-    known = suite.read_known(known_failures) if known_failures else frozenset()
-    with progress_bar() as bar:
-        return suite.check(
-            command,
-            level=level,
-            seed=seed,
-            groups=groups,
-            limits=limits,
-            known=known,
-            progress=Watch(bar, "check", "cases").update,
-        )
 
 
 def show(run: Run) -> None:
@@ -215,13 +201,13 @@ def write_questions(path: Path, level: str, seed: int | None) -> None:
     choose(level)
     seed = secrets.randbelow(NEW_SEEDS) if seed is None else seed
     if path.suffix == ".jsonl":
-        output.check_file(path, (".jsonl",))
+        check_file(path, (".jsonl",))
         sheet = Sheet(level, seed)
         n = sheet_files.write_lines(sheet, path)
     elif path.suffix:
         raise BadInput(f"--questions = {str(path)!r}, must end in .jsonl, or be a folder for CSV")
     else:
-        with output.writable_folder(path) as folder:
+        with writable_folder(path) as folder:
             if any(folder.iterdir()):
                 raise BadInput(f"--questions = {str(path)!r} is not empty, must be a new folder")
             sheet = Sheet(level, seed)

@@ -12,16 +12,15 @@ from matplotlib.figure import Figure
 import fast
 from conformance.audit.runs import scene_named
 from conformance.files import write_file
-from mushrooms import orbits, output
+from mushrooms import orbits
 from mushrooms.figures import energies, style
 from mushrooms.figures import orbits as pictures
 from mushrooms.figures import table as tables
-from mushrooms.output import announce_compilation, progress_bar, refuse_unheeded
+from mushrooms.output import TABLES, announce_compilation, check_file, progress_bar, refuse_unheeded
 from mushrooms.simulate import draw_energies
 from mushrooms.store.run import is_run, open_run
-from scene import Scene, Stem
+from scene import BadInput, Scene, Stem
 from scene.laws import bounds
-from scene.refusal import BadInput
 from scene.tables import laws
 
 
@@ -95,7 +94,7 @@ def draw_scene(
         return
     scene = scene_named(name)
     _check_heeded(kinds, export, options)
-    output.check_file(export, tuple(output.TABLES))
+    check_file(export, tuple(TABLES))
     paths: dict[str, Path] = {}
     if kinds or export is None or out is not None:
         _check_drawable(scene)
@@ -124,7 +123,7 @@ def _check_heeded(kinds: list[str], export: Path | None, options: DrawOptions) -
 def _draw_run(folder: Path, out: Path | None) -> Path:
     """Draw the energies of a stored run, with theory; return the file's path."""
     path = out or Path(f"{folder.resolve().name}.svg")
-    output.check_file(path, (".svg", ".png"))
+    check_file(path, (".svg", ".png"))
     run = open_run(folder)
     draw_energies(path, run.spec, run.gains(), run.shape.n_particles)
     return path
@@ -151,7 +150,7 @@ def _paths(out: Path, kinds: list[str]) -> dict[str, Path]:
         paths = {kind: out.with_stem(f"{out.stem}-{kind}") for kind in kinds}
     for kind, path in paths.items():
         moves = kind in ("walls", "trajectory")
-        output.check_file(path, tables.SUFFIXES if moves else tables.SUFFIXES[:-1])
+        check_file(path, tables.SUFFIXES if moves else tables.SUFFIXES[:-1])
     return paths
 
 

@@ -26,14 +26,12 @@ from conformance.files import write_file
 from fast.paths import captured, sin_phi
 from fast.starts import initial_states
 from fast.validation import check_energy
-from mushrooms import output
-from mushrooms.output import TABLES
-from scene import Outcome, Scene, State, Stem, Wall
+from mushrooms.output import TABLES, check_file
+from scene import Outcome, Scene, State, Stem, Wall, check_scene
 from scene.geometry import TableAt, table_at
 from scene.laws import is_constant, values
 from scene.mouth import start_time
 from scene.refusal import BadInput, check_count, check_number, check_seed
-from scene.tables import check_scene
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -217,7 +215,7 @@ class FollowedOrbit:
         Raises:
             BadInput: another ending, or pyarrow is not installed.
         """
-        output.check_file(Path(path), tuple(TABLES))
+        check_file(Path(path), tuple(TABLES))
         scene = json.dumps(scenes.to_data(self.scene))
         write_file(Path(path), partial(TABLES[Path(path).suffix], [self.columns()], scene=scene))
 

@@ -21,7 +21,7 @@ from rich import progress
 from rich.console import Console
 
 from conformance.files import named, part
-from scene.refusal import BadInput
+from scene import BadInput
 
 FIRST, EVERY = 20.0, 60.0  # seconds to the first line, and between lines, where there is no terminal
 CLOCK = time.monotonic

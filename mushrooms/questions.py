@@ -33,9 +33,8 @@ from conformance.suite.session import Session
 from conformance.suite.sheet_files import read_number, read_rows
 from conformance.suite.symmetry import Transform, draw_transform
 from conformance.vectors import Vector
-from mushrooms import output
 from mushrooms.check import format_outcome
-from mushrooms.output import announce_compilation, new_console, progress_bar
+from mushrooms.output import announce_compilation, check_file, new_console, progress_bar
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined, from_data
 from scene.refusal import shown
 
@@ -112,7 +111,7 @@ def attack_steppers(family: str, cases: int, seed: int, stepper: str, json_file:
     names = list(FAMILIES) if family == "all" else [family]
     if family != "all" and family not in FAMILIES:
         raise BadInput(f"--family = {family!r}, must be all or one of {', '.join(FAMILIES)}")
-    output.check_file(json_file, (".json",))
+    check_file(json_file, (".json",))
     with announce_compilation(), progress_bar() as bar:
         task = bar.add_task("attack", total=cases * len(names))
         tallies = run(
@@ -173,7 +172,7 @@ FIELDS = ("t", "x", "y", "vx", "vy")
 
 def verify_file(file: Path, scene: str | None, picture: Path | None) -> int:
     """Judge each step of a trajectory from the state before it, and return the exit code."""
-    output.check_file(picture, (".svg",))
+    check_file(picture, (".svg",))
     text = _read(file, scene)
     verdicts = _judge(file, text)
     for place, status, reason in verdicts:

@@ -14,9 +14,8 @@ import theory
 from conformance.audit.runs import SCENES, scene_named
 from mushrooms.output import new_console, print_pairs, progress_bar
 from mushrooms.store.summary import expected_collisions
-from scene import Scene
+from scene import BadInput, Scene
 from scene.load import catalogue_text, read_data
-from scene.refusal import BadInput
 
 
 def print_scenes(name: str, as_toml: bool, as_json: bool) -> None:

@@ -17,13 +17,20 @@ from conformance.audit.runs import scene_named
 from conformance.files import named, write_file
 from fast.starts import one_cycle
 from fast.validation import check_phases
-from mushrooms import output
-from mushrooms.output import Watch, announce_compilation, locked, print_pairs, progress_bar
+from mushrooms.output import (
+    Watch,
+    announce_compilation,
+    check_file,
+    locked,
+    print_pairs,
+    progress_bar,
+    writable_folder,
+)
 from mushrooms.store import conduct, engines
 from mushrooms.store.run import StoredRun
 from mushrooms.store.spec import RunSpec
 from mushrooms.store.summary import RunTally, careful_note, explain_limit, gain_of, measured, tally_of
-from scene.refusal import BadInput
+from scene import BadInput
 
 Gains = Callable[[], Iterable[Any]]  # returns ln(E/E0) after each cycle, block by block
 MOST_IN_MEMORY = 10**8  # particles
@@ -83,13 +90,13 @@ def simulate_scene(
     if plot is not None:
         if particles < 2:
             raise BadInput(f"--particles = {particles}, must be >= 2 for --plot")
-        output.check_file(plot, (".svg", ".png"))
+        check_file(plot, (".svg", ".png"))
     spec = RunSpec(scene_named(scene), energy, cycles, seed, _phases(phases))
     arguments = CliArgs(scene, spec, particles, threads, dask, block, max_collisions, max_seconds)
     if out is None:
         found = _in_memory(arguments)
     else:
-        with output.writable_folder(out) as folder, locked(folder):
+        with writable_folder(out) as folder, locked(folder):
             stored = _on_disk(arguments, folder, resume)
             if stored is None:
                 return LIMITED

@@ -15,7 +15,7 @@ from matplotlib.ticker import FixedLocator, NullLocator
 from conformance.bench.record import Growth, Point, Record, quartiles
 from mushrooms.figures import style as plots
 from mushrooms.reports.page import embed, render
-from scene.refusal import BadInput
+from scene import BadInput
 
 ALL = "all"  # workloads, in one table
 BESIDE = "moving-cap-1e7"  # what its times are compared with

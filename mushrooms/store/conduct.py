@@ -21,7 +21,7 @@ from mushrooms.store.engines import Engine, follow
 from mushrooms.store.run import BlockRange, StoredRun, attributes_of, is_run
 from mushrooms.store.spec import Arrays, RunSpec, difference, made_by, shape_of
 from mushrooms.store.summary import expected_collisions
-from scene.refusal import BadInput
+from scene import BadInput
 
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
 LEAST_BLOCK, MOST_BLOCK = 256, 2**17  # particles: a thread's lanes are full, and memory stays small

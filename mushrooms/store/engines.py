@@ -17,7 +17,7 @@ import fast
 import mushrooms
 from mushrooms.store.run import Block, BlockRange
 from mushrooms.store.spec import RunSpec, columns, paused_of
-from scene.refusal import BadInput
+from scene import BadInput
 
 # Receives the number of finished particles of the block in progress; its exceptions end the engine.
 OnProgress = Callable[[int], None]

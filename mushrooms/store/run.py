@@ -28,8 +28,7 @@ import zarr
 
 from conformance.files import sealed, unsealed, write_file
 from fast import Ensemble
-from mushrooms import output
-from mushrooms.output import TABLES
+from mushrooms.output import TABLES, check_file
 from mushrooms.store.spec import (
     FIELDS,
     LANES,
@@ -45,7 +44,7 @@ from mushrooms.store.spec import (
     spec_of,
 )
 from mushrooms.store.summary import RunTally, tally_of
-from scene.refusal import BadInput
+from scene import BadInput
 
 GROUP, MARKERS = "ensemble.zarr", "blocks"
 DESCRIPTION = "run.marker"  # among the markers: the group's attributes once more, sealed
@@ -434,7 +433,7 @@ def export_run(run: Path, to: Path) -> None:
     Raises:
         BadInput: a block is damaged, a table has too many columns, or pyarrow is not installed.
     """
-    output.check_file(to, (".parquet", ".csv", ".npz"))
+    check_file(to, (".parquet", ".csv", ".npz"))
     found = open_run(run)
     if to.suffix == ".npz":
         write_file(to, partial(write_npz, found))

@@ -14,10 +14,9 @@ import theory
 from fast.ensemble import FOLLOWED, UNDECIDED
 from fast.starts import one_cycle
 from mushrooms.store.spec import RunSpec
-from scene import Cap, Mushroom, Scene, Stem
+from scene import BadInput, Cap, Mushroom, Scene, Stem
 from scene.geometry import table_at
 from scene.mouth import mouth_minima, start_time
-from scene.refusal import BadInput
 
 
 class RunTally(NamedTuple):

@@ -32,7 +32,7 @@ from mushrooms.output import (
     writable_folder,
 )
 from mushrooms.reports import audit_page
-from mushrooms.store import conduct, engines
+from mushrooms.store import conduct
 from mushrooms.store.run import is_run
 from mushrooms.store.spec import RunSpec
 from scene import BadInput, Scene
@@ -202,7 +202,7 @@ def follow_run(
     with writable_folder(place), locked(place):
         run = conduct.open_or_create(place, spec, n_particles, None, default, line, resume, at_least=True)
         try:
-            conduct.complete(run, engines.in_process(threads), progress, n_particles=n_particles)
+            conduct.complete(run, conduct.in_process(threads), progress, n_particles=n_particles)
         except OSError as error:
             why = error.strerror or error
             raise BadInput(f"output {str(place)!r}: {why}; --resume takes up what is kept") from None

@@ -26,7 +26,7 @@ from mushrooms.output import (
     progress_bar,
     writable_folder,
 )
-from mushrooms.store import conduct, engines
+from mushrooms.store import conduct
 from mushrooms.store.run import StoredRun
 from mushrooms.store.spec import RunSpec
 from mushrooms.store.summary import RunTally, careful_note, explain_limit, gain_of, measured, tally_of
@@ -176,9 +176,9 @@ def _how_to_resume(run: StoredRun, command: str) -> str:
 def _complete(arguments: CliArgs, run: StoredRun) -> None:
     """Follow what a run lacks."""
     before, seconds = run.tally, run.seconds
-    engine = engines.in_process(arguments.threads)
+    engine = conduct.in_process(arguments.threads)
     if arguments.dask:
-        engine = engines.by_dask(arguments.dask, arguments.threads)
+        engine = conduct.by_dask(arguments.dask, arguments.threads)
     with announce_compilation(), progress_bar() as bar:
         conduct.complete(
             run,

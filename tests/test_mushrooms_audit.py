@@ -489,7 +489,7 @@ def test_what_is_not_there_yet_has_no_phase(tmp_path):
     spec = audit.spec_of(SMALL["mouth"], SEED)
     run = conduct.open_or_create(tmp_path, spec, 150, 64, 64, "", False)
     block_range = list(run.missing())[1]
-    run.keep(block_range, audit.engines.follow(spec, block_range, 1))
+    run.keep(block_range, audit.conduct.follow(spec, block_range, 1))
     with xarray.open_zarr(tmp_path / "ensemble.zarr", mask_and_scale=False) as found:
         there = np.zeros(150, bool)
         there[64:128] = True

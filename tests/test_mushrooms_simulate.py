@@ -35,7 +35,7 @@ from fast.kernel.follow import LANE_ROWS
 from mushrooms import bench, orbits, output, questions
 from mushrooms.main import run
 from mushrooms.output import LOCK, announce_compilation, locked
-from mushrooms.store import conduct, engines
+from mushrooms.store import conduct
 from mushrooms.store.run import DESCRIPTION, GROUP, MARKERS, Block, StoredRun
 from mushrooms.store.spec import RunSpec, shape_of
 from mushrooms.store.summary import (
@@ -459,7 +459,7 @@ def test_a_lost_cluster_is_one_line_that_says_how_to_go_on(
 )
 def test_no_scheduler_is_one_line(capsys, tmp_path, monkeypatch, address):
     """Nor is a client that failed the default of the process: what else uses Dask would wait for it."""
-    monkeypatch.setattr(engines, "CONNECT_TIMEOUT", 0.3)
+    monkeypatch.setattr(conduct, "CONNECT_TIMEOUT", 0.3)
     made = distributed.Client.__init__
 
     def made_at(client, address, **options):

@@ -27,7 +27,7 @@ from fast.kernel import follow as kernel
 from fast.kernel import pools
 from mushrooms import simulate
 from mushrooms.output import LOCK, locked
-from mushrooms.store import conduct, engines
+from mushrooms.store import conduct
 from mushrooms.store import run as stored
 from mushrooms.store.run import DESCRIPTION, DIGESTED, StoredRun
 from mushrooms.store.spec import LANES, SCHEMA, RunSpec, paused_of, shape_of
@@ -78,7 +78,7 @@ def test_blocks_of_any_size_have_one_digest(tmp_path, name, energy, n_cycles):
         run = StoredRun(folder, spec, shape_of(spec, 150, block), "")
         block_ranges = list(run.missing())
         for i in random.permutation(len(block_ranges)).tolist():
-            run.keep(block_ranges[i], engines.follow(spec, block_ranges[i], 1))
+            run.keep(block_ranges[i], conduct.follow(spec, block_ranges[i], 1))
         assert run.sha256() == wanted
         tallies.add((run.tally, gain_of(run.gains)))
     assert len(tallies) == 1
@@ -339,14 +339,14 @@ def faulty_digest(run):
     return found.hexdigest()
 
 
-follow = engines.follow
+follow = conduct.follow
 
 
 @pytest.mark.parametrize(
     ("owner", "name", "faulty"),
     [
         (stored, "_sum", faulty_sums),
-        (engines, "follow", faulty_follow),
+        (conduct, "follow", faulty_follow),
         (StoredRun, "sha256", faulty_digest),
     ],
 )
@@ -524,7 +524,7 @@ def test_a_run_that_would_go_on_otherwise_does_not(command_line, tmp_path, monke
     """The first particles are followed both ways before a block is touched."""
     summary_of(command_line(*lengthened(tmp_path, 1)))
     before = held(tmp_path)
-    monkeypatch.setattr(engines, "paused_of", faulty)
+    monkeypatch.setattr(conduct, "paused_of", faulty)
     assert_refused(command_line(*lengthened(tmp_path, 2)), "of its first particles comes out otherwise here")
     assert held(tmp_path) == before
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import tempfile
 import time
-from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from conformance import plain
 from conformance.bench import baselines, growth, record, solvers, workloads
 from conformance.bench.growth import FAR, PathFollower, PathPoint, Sensitivity
 from conformance.bench.record import Record, Size
-from conformance.bench.solvers import Family, Solver, SolverAnswer, SolverRun, by_call, by_command
+from conformance.bench.solvers import Solver, SolverAnswer, SolverRun, by_call, by_command
 from conformance.bench.workloads import FLIGHTS, Workload
 from conformance.cases.certify import Links
 from conformance.cases.prover import collided, proved_step
@@ -42,6 +41,12 @@ FURTHER = {"quick": 200, "full": 2000}
 REPEATS = {"quick": 5, "full": 11}
 LASTING = {"quick": (3e6, 4e8), "full": (2e7, 4e9)}  # ns: of a run at least, of all runs at most
 PATHS = {"quick": (3, 40), "full": (9, 80)}
+DIGITS = (15, 30, 50, 100, 200)  # of the proofs that are timed
+PATH_DIGITS = (30, 60)  # working decimals of the proofs whose growth is followed
+LANES_SERVE = (
+    "breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12", "two-harmonics",
+    "sixteen-harmonics", "moving-slope", "bang-bang", "one-path",
+)  # fmt: skip
 
 
 def measure_solvers(
@@ -127,17 +132,13 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
     except CheckFailure as failure:
         not_run["lean C, time steps"] = failure.why
 
-    def add(name: str, family: Family, line: Sequence[str]) -> None:
-        found.append(by_command(name, family, line, stack, limits))
-
-    examples = find_examples(folder, baselines.FLAGS)
-    for language, example in examples.items():
+    for language, example in find_examples(folder, baselines.FLAGS).items():
         name = f"example in {language}"
         if not example.command:
             not_run[name] = example.why_not
             continue
         try:
-            add(name, "example", example.command)
+            found.append(by_command(name, "example", example.command, stack, limits))
         except (CheckFailure, BadInput) as failure:
             not_run[name] = str(failure)
             continue
@@ -145,18 +146,11 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
             built[name] = example.built
     if command:
         try:
-            add(f"command {' '.join(command)}", "command", command)
+            name = f"command {' '.join(command)}"
+            found.append(by_command(name, "command", command, stack, limits))
         except CheckFailure as failure:
             raise BadInput(f"command {command[0]!r} {failure.verdict}: {failure.why}") from None
     return found, built, not_run
-
-
-DIGITS = (15, 30, 50, 100, 200)
-PATH_DIGITS = (30, 60)  # working decimals of the proofs whose growth is followed
-LANES_SERVE = (
-    "breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12", "two-harmonics",
-    "sixteen-harmonics", "moving-slope", "bang-bang", "one-path",
-)  # fmt: skip
 
 
 def prove_path(scene: Scene, state: State, n_collisions: int) -> tuple[list[PathPoint], list[Sensitivity]]:

@@ -36,7 +36,7 @@ def whole(help: str, low: int, high: int | None = None) -> Any:
             number = Decimal(text)
         except InvalidOperation:
             number = Decimal("nan")
-        # An exponent may be any: an integer of so many digits is not made.
+        # 1e1000000 is refused before it is made an integer of a million digits.
         if not number.is_finite() or number.adjusted() > 30 or number != number.to_integral_value():
             raise typer.BadParameter(f"{str(text)[:40]!r}, must be a whole number, {bounds}")
         if number < low or (high is not None and number > high):
@@ -73,7 +73,6 @@ SceneName = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Seed = Annotated[int, whole("Seed of the random starts, 0 to 2^64 - 1.", 0, MOST_SEED)]
-QuestionSeed = Annotated[int, whole("Seed of the questions, 0 to 2^64 - 1.", 0, MOST_SEED)]
 
 
 def print_version(is_wanted: bool) -> None:
@@ -372,7 +371,7 @@ def bench(
     ] = None,
     out: Annotated[Path, file("Folder for the results.", metavar="DIR")] = Path("bench-report"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and runs: five minutes.")] = False,
-    seed: QuestionSeed = 0,
+    seed: Annotated[int, whole("Seed of the questions, 0 to 2^64 - 1.", 0, MOST_SEED)] = 0,
     table: Annotated[
         Path | None,
         file("Print a table of an earlier bench.json as Markdown, and stop.", metavar="OLD.json"),

@@ -126,14 +126,15 @@ def draw_gallery(app: Any) -> None:
 
 def write_commands(_: Any) -> None:
     """Write what every command says of itself."""
+    from typer.main import get_command
     from typer.testing import CliRunner
 
-    from mushrooms.main import COMMANDS, PROGRAM, app
+    from mushrooms.commands import app
 
     sections = []
-    for name in COMMANDS:
-        shown = CliRunner().invoke(app, [name, "--help"], prog_name=PROGRAM, terminal_width=86)
-        sections.append(f"## {PROGRAM} {name}\n\n```none\n{shown.output.strip()}\n```\n")
+    for name in get_command(app).commands:
+        shown = CliRunner().invoke(app, [name, "--help"], prog_name="mushrooms", terminal_width=86)
+        sections.append(f"## mushrooms {name}\n\n```none\n{shown.output.strip()}\n```\n")
     (DOCS / "generated").mkdir(exist_ok=True)
     (DOCS / "generated" / "commands.md").write_text("\n".join(sections), "utf-8")
 

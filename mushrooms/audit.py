@@ -1,89 +1,71 @@
-"""`mushrooms audit`: conducts the audit with the fast stepper and writes its report."""
+"""`mushrooms audit`: conducts the audit with the fast stepper and writes its report.
+
+DIR/runs/NAME is what `mushrooms simulate --out` makes, here or elsewhere.
+"""
 
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Annotated
 
-import typer
 from rich import progress
 
 import fast
 from conformance.audit import session
 from conformance.audit.claim import AuditSteppers, Claim
 from conformance.audit.claims import all_claims, select_claims
-from conformance.audit.runs import Size
+from conformance.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
 from conformance.audit.session import AuditResult, AuditSettings
 from conformance.files import write_files
-from mushrooms import audit_runs, output
-from mushrooms.output import locked
-from mushrooms.terminal import announce_compilation, progress_bar, refuse_unheeded
-from scene.refusal import MAX_SEED, BadInput
+from fast import Ensemble
+from fast.ensemble import SHARE
+from mushrooms.audit_ensemble import Options, audit_ensemble
+from mushrooms.output import (
+    Watch,
+    announce_compilation,
+    locked,
+    progress_bar,
+    refuse_unheeded,
+    writable_folder,
+)
+from mushrooms.reports import audit_page
+from mushrooms.store import conduct
+from mushrooms.store.run import is_run
+from mushrooms.store.spec import RunSpec
+from scene import BadInput, Scene
 
 
-def audit(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the report.")] = Path("audit-report"),
-    full: Annotated[bool, typer.Option("--full", help="The paper's sizes; an hour on two cores.")] = False,
-    only: Annotated[
-        str | None, typer.Option(metavar="IDS", help="Only these claims, separated by commas: X2,L4.")
-    ] = None,
-    seed: Annotated[
-        int, typer.Option(min=0, max=MAX_SEED, help="Seed of the random starts, 0 to 2^64 - 1.")
-    ] = 0,
-    threads: Annotated[int | None, typer.Option(min=1, help="Threads; all cores by default.")] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Continue with DIR/runs and DIR/findings.")
-    ] = False,
-    commands: Annotated[
-        bool, typer.Option("--commands", help="Print the runs as simulate commands, one per line, and stop.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-    ensemble: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Audit this ensemble: CSV, Parquet or Zarr.")
-    ] = None,
-    scene: Annotated[str | None, typer.Option(metavar="SCENE", help="Scene of --ensemble.")] = None,
-    backwards: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="An ensemble of the reversed cycle, to compare with --ensemble."),
-    ] = None,
-    energy: Annotated[
-        float | None,
-        typer.Option(min=0, help="Initial energy: chooses rows, or replaces a missing column E0."),
-    ] = None,
-    energy_unit: Annotated[str | None, typer.Option(help="Unit of energies: v2/2 (default) or v2.")] = None,
-    time_unit: Annotated[
-        str | None, typer.Option(help="Unit of times: scene or cycles; default: inferred.")
-    ] = None,
-    particles: Annotated[
-        int | None, typer.Option(help="Number of started particles, if some have no row.")
-    ] = None,
-) -> None:
-    """Check the claims of the paper. Writes report.html, report.json and report.txt.
-
-    Particles are stored in DIR/runs/NAME, like those of simulate --out, and results in DIR/findings. --resume
-    continues after an interruption, with --full or with other claims (--only). The report then holds the
-    old and the new claims. The runs that --commands prints may be made anywhere; --resume uses them. No run
-    is ever replaced.
-
-    --ensemble compares an ensemble of another program with theory at its energy.
-
-    Exit code 0 if every claim has its expected verdict, 1 if one has not, 2 on bad input.
-    """
-    theirs = {"--scene": scene, "--backwards": backwards, "--energy": energy, "--energy-unit": energy_unit}
-    theirs |= {"--time-unit": time_unit, "--particles": particles}
+def audit_claims(
+    out: Path,
+    full: bool,
+    only: str | None,
+    seed: int,
+    threads: int | None,
+    resume: bool,
+    commands: bool,
+    as_json: bool,
+    ensemble: Path | None,
+    scene: str | None,
+    backwards: Path | None,
+    energy: float | None,
+    energy_unit: str | None,
+    time_unit: str | None,
+    particles: int | None,
+) -> int:
+    """Check the paper's claims, or an ensemble of another program; return the exit code."""
+    of_ensemble = {"--scene": scene, "--backwards": backwards, "--energy": energy}
+    of_ensemble |= {"--energy-unit": energy_unit, "--time-unit": time_unit, "--particles": particles}
     if ensemble is None:
-        refuse_unheeded(theirs, "there is no --ensemble")
-        _audit_paper(out, full, only, seed, threads, resume, commands, as_json)
-        return
-    from mushrooms.audit_ensemble import Options, audit_ensemble
-
-    ours = {"--full": full or None, "--only": only, "--threads": threads, "--resume": resume or None}
-    refuse_unheeded({**ours, "--commands": commands or None}, "an --ensemble is audited")
+        refuse_unheeded(of_ensemble, "there is no --ensemble")
+        return _audit_paper(out, full, only, seed, threads, resume, commands, as_json)
+    of_paper = {"--full": full or None, "--only": only, "--threads": threads}
+    of_paper |= {"--resume": resume or None, "--commands": commands or None}
+    refuse_unheeded(of_paper, "an --ensemble is audited")
     options = Options(energy, energy_unit or "v2/2", time_unit, particles)
-    raise typer.Exit(audit_ensemble(ensemble, scene, backwards, options, out, as_json))
+    return audit_ensemble(ensemble, scene, backwards, options, out, as_json)
 
 
 def _audit_paper(
@@ -95,19 +77,17 @@ def _audit_paper(
     resume: bool,
     commands: bool,
     as_json: bool,
-) -> None:
+) -> int:
     """Conduct the audit of the paper's claims."""
-    from mushrooms.reports import audit_page  # drawing takes a second to import
-
     if only is not None and not only.replace(",", " ").split():
         raise BadInput(f"--only = {only!r}, must name a claim such as X2; all are checked without it")
     claims = select_claims(only or "")
     size: Size = "full" if full else "quick"
     if commands:
-        lines = [audit_runs.command(run, size, seed, out) for run in audit_runs.needed(claims, size)]
+        lines = [command(run, size, seed, out) for run in needed(claims, size)]
         print(json.dumps(lines, indent=2) if as_json else "\n".join(lines))
-        return
-    with output.writable_folder(out) as folder, locked(folder):
+        return 0
+    with writable_folder(out) as folder, locked(folder):
         settings = AuditSettings(size, seed, threads, folder / "findings", resume)
         # What a killed audit was writing: no other process writes under these names, as the folder is held.
         for path in (*folder.glob(".report.*.part"), *folder.glob("findings/.*.finding.*.part")):
@@ -125,7 +105,7 @@ def _audit_paper(
     else:
         print(texts["report.txt"], end="")
         print(f"Report: {folder / 'report.html'}")
-    raise typer.Exit(0 if result.is_passed else 1)
+    return 0 if result.is_passed else 1
 
 
 def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -> AuditResult:
@@ -133,43 +113,107 @@ def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -
     if settings.resume:
         wanted = {claim.id for claim in claims} | session.kept(settings)
         claims = tuple(claim for claim in all_claims() if claim.id in wanted)
-        _check_report(folder, wanted)
-    runs = audit_runs.KeptRuns(folder, settings.resume)
-    runs.check(audit_runs.needed(claims, settings.size), settings.seed)
-    with announce_compilation(), progress_bar() as bar:
-        return session.conduct(
-            AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
-            settings,
-            claims=claims,
-            simulate_run=runs.simulate,
-            progress=_advance(bar),
-        )
-
-
-def _check_report(folder: Path, wanted: set[str]) -> None:
-    """Refuse to replace a report by one that has fewer claims, as other settings would."""
+    check_runs(folder, needed(claims, settings.size), settings.seed, settings.resume)
     try:
-        report = json.loads((folder / "report.json").read_text("utf-8"))
-        there = {finding["id"] for finding in report["findings"]}
-    except (OSError, ValueError, KeyError, TypeError):  # there is no report that could be lost
-        return
-    if there - wanted:
-        raise BadInput(
-            f"output {str(folder)!r} has a report of {len(there)} claims, size = {report.get('size')!r} and"
-            f" seed = {report.get('seed')}; {len(wanted)} are asked for: with --resume none is given up"
-        )
+        with announce_compilation(), progress_bar() as bar:
+            return session.conduct(
+                AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
+                settings,
+                claims=claims,
+                simulate_run=lambda name: partial(follow_run, folder / FOLDER / name, settings.resume),
+                progress=_watch_runs(bar),
+            )
+    except KeyboardInterrupt as error:
+        error.add_note("finished parts are in the folder of the report: --resume continues the audit")
+        raise
 
 
-def _advance(bar: progress.Progress) -> Callable[[str, int, int], None]:
-    tasks: dict[str, progress.TaskID] = {}
-    finished = set[str]()
+def _watch_runs(bar: progress.Progress) -> Callable[[str, int, int], None]:
+    """Return what moves a bar for each run."""
+    watches: dict[str, Watch] = {}
 
     def advance(run: str, n_done: int, n_total: int) -> None:
-        if run not in tasks:
-            tasks[run] = bar.add_task(run, total=n_total)
-        bar.update(tasks[run], completed=n_done)
-        if n_done == n_total and run not in finished and bar.disable:
-            finished.add(run)
-            print(f"{run}: {n_done:,} particles", file=sys.stderr)
+        if run not in watches:
+            watches[run] = Watch(bar, run, "particles")
+        watches[run].update(n_done, n_total)
 
     return advance
+
+
+FOLDER = "runs"
+
+
+def needed(claims: Sequence[Claim], size: Size) -> list[Simulation]:
+    """Return the runs that claims rest on, in the order in which they are made."""
+    runs = [RUNS[name] for name in dict.fromkeys(name for claim in claims for name in claim.runs)]
+    return [run for run in runs if run.n_particles(size)]
+
+
+def spec_of(run: Simulation, seed: int) -> RunSpec:
+    """Return what decides the bits of a run in the audit of a seed."""
+    return RunSpec(scene_of(run), run.energy, run.n_cycles, run_seed(seed, run), run.phases)
+
+
+def command(run: Simulation, size: Size, seed: int, folder: Path) -> str:
+    """Return the command that makes a run where an audit in the folder takes it up with --resume."""
+    return spec_of(run, seed).command(run.scene, run.n_particles(size), folder / FOLDER / run.name)
+
+
+def check_runs(folder: Path, runs: Sequence[Simulation], seed: int, resume: bool) -> None:
+    """Refuse at once what would be refused when its turn has come.
+
+    Args:
+        folder: of the audit, held by the caller.
+        runs: that are to be followed there.
+        seed: of the audit.
+        resume: whether runs that are there may be gone on with.
+
+    Raises:
+        BadInput: the folder of one of these runs holds another, or this one and `resume` was not
+            asked for, or another process writes in it.
+    """
+    for run in runs:
+        place = folder / FOLDER / run.name
+        if is_run(place):
+            with locked(place):
+                conduct.read_description(place, spec_of(run, seed), {})
+            if not resume:
+                how = "--resume takes it up, another --out begins anew"
+                raise BadInput(f"output {str(place)!r} holds a run of this audit: {how}")
+
+
+def follow_run(
+    place: Path,
+    resume: bool,
+    scene: Scene,
+    *,
+    n_particles: int,
+    energy: float,
+    n_cycles: int,
+    seed: int,
+    threads: int | None,
+    phases: tuple[float, ...],
+    progress: Callable[[int], None],
+) -> Ensemble:
+    """Return what `fast.simulate` would, and follow only what the run's folder lacks."""
+    spec = RunSpec(scene, energy, n_cycles, seed, phases)
+    line = spec.command(scene.name, n_particles, place)
+    default = block_size(spec, n_particles, threads or os.cpu_count() or 1)
+    with writable_folder(place), locked(place):
+        run = conduct.open_or_create(place, spec, n_particles, None, default, line, resume, at_least=True)
+        try:
+            conduct.complete(run, conduct.in_process(threads), progress, n_particles=n_particles)
+        except OSError as error:
+            why = error.strerror or error
+            raise BadInput(f"output {str(place)!r}: {why}; --resume takes up what is kept") from None
+        return run.ensemble(n_particles)
+
+
+def block_size(spec: RunSpec, n_particles: int, threads: int) -> int:
+    """Return how many particles of a new run are kept at a time, at most all of them.
+
+    At the end of a block the lanes wait for its slowest particle. Energies spread with the cycles, so that
+    what takes seconds has too few particles to wait for: each thread has a share of `fast`, at the least.
+    """
+    wanted = max(conduct.block_size(spec, threads), SHARE * threads) * spec.n_cycles
+    return min(wanted, conduct.MOST_BLOCK, n_particles)

@@ -1,31 +1,46 @@
-"""`mushrooms bench`: speed against error on the same runs, and error growth."""
+"""`mushrooms bench`: speed against error on the same runs, and error growth.
+
+Our steppers are among the solvers that are measured, and the proofs are what all are measured against.
+"""
 
 from __future__ import annotations
 
+import math
 import tempfile
 import time
-from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
 
-import typer
 from rich.markup import escape
-from rich.table import Column, Table
 
 import fast
+import reference
+from conformance import plain
 from conformance.bench import baselines, record, solvers, workloads
-from conformance.bench.record import Record, Size, quartiles
-from conformance.bench.solvers import Family, Solver, by_command
-from conformance.cases.certify import proved_step
+from conformance.bench.record import Record, Size
+from conformance.bench.solvers import (
+    FAR,
+    PathFollower,
+    PathPoint,
+    Sensitivity,
+    Solver,
+    SolverAnswer,
+    SolverRun,
+    by_call,
+    by_command,
+)
+from conformance.bench.workloads import FLIGHTS, Workload
+from conformance.cases.certify import Links, collided, proved_step
 from conformance.files import Writer, write_files
+from conformance.grading.agreement import Answer, Enclosed, exact
 from conformance.harness.examples import find_examples
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
-from mushrooms import bench_solvers as ours
-from mushrooms import output
-from mushrooms.terminal import announce_compilation, new_console, progress_bar, refuse_unheeded
-from scene.refusal import MAX_SEED, BadInput
+from fast.batch import careful_steps, fine_steps, flights, lane_steps
+from mushrooms.figures import style
+from mushrooms.output import announce_compilation, progress_bar, refuse_unheeded, writable_folder
+from mushrooms.reports import bench_page
+from scene import BadInput, Collision, Scene, State
 
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
 # By size: questions of a workload, steps with walls only, runs, trajectories and their length.
@@ -34,55 +49,38 @@ FURTHER = {"quick": 200, "full": 2000}
 REPEATS = {"quick": 5, "full": 11}
 LASTING = {"quick": (3e6, 4e8), "full": (2e7, 4e9)}  # ns: of a run at least, of all runs at most
 PATHS = {"quick": (3, 40), "full": (9, 80)}
+DIGITS = (15, 30, 50, 100, 200)  # of the proofs that are timed
+PATH_DIGITS = (30, 60)  # working decimals of the proofs whose growth is followed
+LANES_SERVE = (
+    "breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12", "two-harmonics",
+    "sixteen-harmonics", "moving-slope", "bang-bang", "one-path",
+)  # fmt: skip
 
 
-def bench(
-    command: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[-- COMMAND...]", help="Also measure this stepper; it speaks protocol 1."),
-    ] = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path("bench-report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and runs: five minutes.")] = False,
-    seed: Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of the questions, 0 to 2^64 - 1.")] = 0,
-    table: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="OLD.json", help="Print a table of an earlier bench.json as Markdown, and stop."
-        ),
-    ] = None,
-    workload: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Workload of --table, or `all`; default: moving-cap-1e7."),
-    ] = None,
+def measure_solvers(
+    command: list[str], out: Path, quick: bool, seed: int, table: Path | None, workload: str | None
 ) -> None:
-    """Measure speed against error. Writes bench.json, bench.svg and bench.html.
-
-    Exit code 0, or 2 on bad input.
-    """
-    from mushrooms.figures import speed, style  # drawing takes a second to import
-    from mushrooms.reports import bench_page
-
-    if table is None:
-        refuse_unheeded({"--workload": workload}, "it needs --table")
-    else:
+    """Measure speed against error and write it into a folder; or print a table of an earlier benchmark."""
+    if table is not None:
         measuring = {"--quick": quick or None, "COMMAND": command or None}
         refuse_unheeded(measuring, "--table measures nothing")
         print(bench_page.to_markdown(record.read(table), workload or "moving-cap-1e7"), end="")
         return
+    refuse_unheeded({"--workload": workload}, "it needs --table")
     size: Size = "quick" if quick else "full"
-    with output.writable_folder(out) as folder, announce_compilation():
-        found = _measure(size, seed, command or [])
-        picture = style.svg(speed.headline(found))
+    with writable_folder(out) as folder, announce_compilation():
+        found = _measure(size, seed, command)
+        picture = style.svg(bench_page.headline(found))
         files: dict[str, bytes | str | Writer] = {
             "bench.json": record.encode(found),
             "bench.svg": picture,
             "bench.html": bench_page.to_html(found, picture),
         }
         write_files(folder, files)
-    console = new_console()
-    console.print(_table(found))
+    for drawn in found.workloads:
+        print(f"{drawn.name}\n\n{bench_page.to_markdown(found, drawn.name)}")
     for name, why in found.not_run.items():
-        console.print(f"not run: {name}: {why}", markup=False)
+        print(f"not run: {name}: {why}")
     print(f"{found.seconds:.0f} s. Report: {folder / 'bench.html'}")
 
 
@@ -111,7 +109,7 @@ def _measure(size: Size, seed: int, command: list[str]) -> Record:
             tick("")
         n_paths, length = PATHS[size]
         bar.reset(task, total=n_paths, description="error growth")
-        grown = solvers.grow(ours.our_followers(), proved_step, ours.prove_path, seed, n_paths, length, tick)
+        grown = solvers.grow(our_followers(), proved_step, prove_path, seed, n_paths, length, tick)
     return record.Record(
         format=record.FORMAT,
         size=size,
@@ -133,7 +131,7 @@ def _measure(size: Size, seed: int, command: list[str]) -> Record:
 def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
     """Return solvers, what was compiled, and what cannot run."""
     limits = Limits(TIMEOUT, RESTARTS)
-    found = [*ours.our_solvers(), *baselines.in_python()]
+    found = [*our_solvers(), *baselines.in_python()]
     built, not_run = dict[str, str](), dict[str, str]()
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     try:
@@ -142,17 +140,13 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
     except CheckFailure as failure:
         not_run["lean C, time steps"] = failure.why
 
-    def add(name: str, family: Family, line: Sequence[str]) -> None:
-        found.append(by_command(name, family, line, stack, limits))
-
-    examples = find_examples(folder, baselines.FLAGS)
-    for language, example in examples.items():
+    for language, example in find_examples(folder, baselines.FLAGS).items():
         name = f"example in {language}"
         if not example.command:
             not_run[name] = example.why_not
             continue
         try:
-            add(name, "example", example.command)
+            found.append(by_command(name, "example", example.command, stack, limits))
         except (CheckFailure, BadInput) as failure:
             not_run[name] = str(failure)
             continue
@@ -160,26 +154,127 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
             built[name] = example.built
     if command:
         try:
-            add(f"command {' '.join(command)}", "command", command)
+            name = f"command {' '.join(command)}"
+            found.append(by_command(name, "command", command, stack, limits))
         except CheckFailure as failure:
             raise BadInput(f"command {command[0]!r} {failure.verdict}: {failure.why}") from None
     return found, built, not_run
 
 
-def _table(found: Record) -> Table:
-    from mushrooms.reports import bench_page
+def prove_path(scene: Scene, state: State, n_collisions: int) -> tuple[list[PathPoint], list[Sensitivity]]:
+    """Follow a path by proof, right to twenty digits at its end, and chain the Jacobians of its steps."""
+    path, links = reference.trajectory(scene, state, n_collisions, digits=20), Links(scene, state, FAR)
+    chain = [Sensitivity(links.add(step), links.held[0]) for step in path.steps]
+    return _places(path), chain
 
-    numbers = ("ns/collision", "quartiles", "median ulps", "worst ulps", "wrong", "undecided", "left")
-    table = Table(
-        "workload", Column("stepper", no_wrap=True), title="Speed against error", title_justify="left"
-    )
-    for name in (*numbers, "wrong of further"):
-        table.add_column(name, justify="right")
-    for p in found.points:
-        middle, worst = bench_page.middle_and_worst(p.ulps, ".2g")
-        counts = [str(n) if n else "" for n in (p.wrong, p.undecided, p.left)]
-        first, ns, third = quartiles(p.ns)
-        spread = f"-{1 - first / ns:.1%} +{third / ns - 1:.1%}"
-        row = [escape(p.solver), f"{ns:,.0f}", spread, middle, worst, *counts, bench_page.astray(p)]
-        table.add_row(p.workload, *row)
-    return table
+
+def our_solvers() -> list[Solver]:
+    """Return our steppers: the reference at several precisions, and the fast one's five ways."""
+    return [
+        *(_proof(digits) for digits in DIGITS),
+        by_call("fast, a call", "compiled", fast.next_collision),
+        Solver("fast, careful", "compiled", _careful),
+        Solver("fast, pairs", "compiled", _fine),
+        Solver("fast, lanes", "compiled", _lanes, LANES_SERVE, lane_steps),
+        Solver("fast, trajectory", "compiled", _trajectory, ("one-path",)),
+    ]
+
+
+def our_followers() -> dict[str, PathFollower]:
+    """Return followers of trajectories: binary64, with compensated time, and proofs of fixed precision."""
+    return {
+        "binary64 (plain Python)": _plain_path,
+        "compensated (fast)": _fast_path,
+        "double-double (fast)": _fine_path,
+        **{f"proof, {digits} decimals": _proof_path(digits) for digits in PATH_DIGITS},
+    }
+
+
+def _proof(digits: int) -> Solver:
+    def step(scene: Scene, state: State, t_end: float) -> Answer:
+        found = reference.next_collision(scene, state, t_end, digits=digits)
+        if isinstance(found, reference.Collision):
+            return Enclosed(found.wall, list(collided(found).values()))
+        return found.rounded() if isinstance(found, reference.Horizon) else found
+
+    return by_call(f"proof, {digits} digits", "proof", step)
+
+
+def _careful(workload: Workload, n_times: int) -> SolverRun:
+    answers, seconds = careful_steps(workload.scene, [q.state for q in workload.questions], n_times)
+    return SolverRun(seconds / (n_times * len(answers)) * 1e9, list(answers), seconds * 1e9)
+
+
+def _fine(workload: Workload, n_times: int) -> SolverRun:
+    paths, seconds = fine_steps(workload.scene, [q.state for q in workload.questions], n_times)
+    answers: list[SolverAnswer] = []
+    for path in paths:
+        if path.outcome is None:
+            dt, _, *place = path.numbers(0)
+            answers.append(exact(path.walls[0], (dt, *place)))
+        else:
+            answers.append(path.outcome)
+    return SolverRun(seconds / (n_times * len(answers)) * 1e9, answers, seconds * 1e9)
+
+
+def _lanes(workload: Workload, n_times: int) -> SolverRun:
+    """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
+    states = [q.state for q in workload.questions]
+    copies = -(-128 // len(states))  # enough to fill both pools
+    followed = states[:1] if workload.length else states * copies
+    t_end = workload.end(workload.length or FLIGHTS)
+    seconds, n_collisions = 0.0, 0
+    for _ in range(n_times):
+        n, lasted = flights(workload.scene, followed, t_end)
+        n_collisions, seconds = n_collisions + n, seconds + lasted
+    return SolverRun(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
+
+
+def _trajectory(workload: Workload, n_times: int) -> SolverRun:
+    """Time a path from the first question, the call and its arrays included; grade a step from each."""
+    states = [q.state for q in workload.questions]
+    paths = [fast.trajectory(workload.scene, state, 1) for state in states]
+    begin = time.perf_counter_ns()
+    for _ in range(n_times):
+        fast.trajectory(workload.scene, states[0], workload.length)
+    ns = time.perf_counter_ns() - begin
+    answers: list[SolverAnswer] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
+    return SolverRun(ns / (n_times * workload.length), answers, ns)
+
+
+def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
+    found = plain.trajectory(scene, state, n_collisions, state.t + FAR)
+    return [PathPoint(c.wall, c.x, c.y, c.vx, c.vy) for c in found if isinstance(c, Collision)]
+
+
+def _fast_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
+    path = fast.trajectory(scene, state, n_collisions)
+    return [PathPoint(wall, *row[2:]) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)]
+
+
+def _fine_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
+    path = fast.fine_trajectory(scene, state, n_collisions)
+    found = []
+    for i, wall in enumerate(path.walls):
+        _, _, x, y, vx, vy = path.numbers(i)
+        found.append(PathPoint(wall, x, y, vx, vy))
+    return found
+
+
+def _proof_path(digits: int) -> PathFollower:
+    def follow(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
+        return _places(reference.trajectory(scene, state, n_collisions, working=digits))
+
+    return follow
+
+
+def _places(path: reference.Trajectory) -> list[PathPoint]:
+    found = []
+    for step in path.steps:
+        ends = [c.centre() for c in step.after[1:]]
+        size, speed = (math.hypot(*map(float, pair)) for pair in (ends[:2], ends[2:]))
+        widths = [c.width() for c in step.after[1:]]
+        x, y, vx, vy = ends
+        width = max(max(widths[:2]) / size, max(widths[2:]) / speed)
+        found.append(PathPoint(step.wall, x, y, vx, vy, width))
+    return found

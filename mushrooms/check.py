@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import secrets
 import shlex
-import sys
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import Progress
-from rich.table import Table
+from rich.table import Column, Table
 
-from conformance import suite
 from conformance.files import write_file
-from conformance.suite import reports
+from conformance.suite import check, read_known, reports
 from conformance.suite.result import VERDICTS, Run
 from conformance.suite.run import NEW_SEEDS, choose
 from conformance.suite.session import Limits
@@ -31,85 +26,58 @@ from conformance.suite.sheet import (
     write_lines,
     write_tables,
 )
-from mushrooms import output
-from mushrooms.terminal import new_console, progress_bar, refuse_unheeded
-from scene.refusal import MAX_SEED, BadInput
+from mushrooms.output import Watch, check_file, new_console, progress_bar, refuse_unheeded, writable_folder
+from scene import BadInput
 
-LONGEST = 7 * 86_400  # seconds
-EVERY = 10.0  # seconds between lines where there is no terminal
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
 MAX_TAUGHT = 5  # of them with what was given and what is certified, or with what was sent
 MAX_SENT = 500  # characters of that, and of a line of standard error
 MAX_ERRORS = 6  # lines of that
 COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
 
-Seed = Annotated[
-    int | None, typer.Option(min=0, max=MAX_SEED, help="Seed of the questions; default: a new one.")
-]
-Total = Annotated[
-    float | None, typer.Option(min=0, max=LONGEST, help="Seconds for the whole run; no limit by default.")
-]
 
-
-def check(
-    command: Annotated[
-        list[str] | None, typer.Argument(metavar="-- COMMAND...", help="The stepper; it speaks protocol 1.")
-    ] = None,
-    level: Annotated[str, typer.Option(help="core, extended or stress.")] = "core",
-    seed: Seed = None,
-    timeout: Annotated[
-        float, typer.Option(min=0, max=LONGEST, help="Seconds for one answer, compilation included.")
-    ] = 120.0,
-    total: Total = None,
-    restarts: Annotated[
-        int, typer.Option(min=0, max=1000, help="Fresh processes after the first, 0 to 1000.")
-    ] = 10,
-    groups: Annotated[
-        str, typer.Option(help="Only these groups of cases, separated by commas; default: all.")
-    ] = "",
-    known_failures: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Known to fail, one per line: ID, ID@SEED, fresh/*, declined/GROUP."
-        ),
-    ] = None,
-    json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="JSON report.")] = None,
-    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="JUnit XML report.")] = None,
-    html: Annotated[Path | None, typer.Option(metavar="FILE", help="HTML report.")] = None,
-    badge: Annotated[Path | None, typer.Option(metavar="FILE", help="Badge (SVG) to publish.")] = None,
-    summary: Annotated[Path | None, typer.Option(metavar="FILE", help="Verdict and scope as JSON.")] = None,
-    questions: Annotated[
-        Path | None,
-        typer.Option(metavar="PATH", help="Write the questions to a .jsonl file, or as CSV into a folder."),
-    ] = None,
-    answers: Annotated[
-        Path | None, typer.Option(metavar="PATH", help="Grade these answers to the file of --questions.")
-    ] = None,
-) -> None:
-    """Test a stepper in any language. COMMAND starts it; it speaks protocol 1 on stdin and stdout.
-
-    Each question is randomly mirrored and rescaled. The seed is printed, and --seed repeats a run.
-    Without a dialogue: --questions writes questions to a file, --answers grades the answers in a file.
-
-    Exit code 0 if everything passes, 1 if something fails, 2 if the options or the suite are at fault.
-    """
-    files = _report_files(json=json_file, junit=junit, html=html, badge=badge, summary=summary)
+def check_stepper(
+    command: list[str],
+    level: str,
+    seed: int | None,
+    timeout: float,
+    total: float | None,
+    restarts: int,
+    groups: str,
+    known_failures: Path | None,
+    reports_asked: Mapping[str, Path | None],
+    questions: Path | None,
+    answers: Path | None,
+) -> int:
+    """Grade a stepper or a file of answers, or write a file of questions; return the exit code."""
+    files = _report_files(reports_asked)
     if questions or answers:
-        unheeded = {"COMMAND": command, "--groups": groups or None, "--known-failures": known_failures}
+        unheeded: dict[str, object] = {"COMMAND": command or None, "--groups": groups or None}
+        unheeded["--known-failures"] = known_failures
         refuse_unheeded(unheeded, "questions and answers are in files")
     if answers:
         run = grade_file(answers, questions, level, seed)
     elif questions:
         refuse_unheeded({str(path): True for path in files}, "nothing is graded yet")
         write_questions(questions, level, seed)
-        return
+        return 0
     else:
-        limits = Limits(timeout, restarts, total)
-        run = _run(command or [], level, seed, _names_of(groups), limits, known_failures)
+        names = _names_of(groups)
+        known = read_known(known_failures) if known_failures else frozenset()
+        with progress_bar() as bar:
+            run = check(
+                command,
+                level=level,
+                seed=seed,
+                groups=names,
+                limits=Limits(timeout, restarts, total),
+                known=known,
+                progress=Watch(bar, "check", "cases").update,
+            )
     for path, content in files.items():
         write_file(path, content(run))
     show(run)
-    raise typer.Exit(run.exit_code())
+    return run.exit_code()
 
 
 def _names_of(groups: str) -> list[str]:
@@ -136,71 +104,34 @@ WRITERS: dict[str, tuple[str, Callable[[Run], bytes | str]]] = {
 }
 
 
-def _report_files(**given: Path | None) -> dict[Path, Callable[[Run], bytes | str]]:
+def _report_files(given: Mapping[str, Path | None]) -> dict[Path, Callable[[Run], bytes | str]]:
     """Return the report files that are asked for, each with what makes its content."""
     files: dict[Path, Callable[[Run], bytes | str]] = {}
     for option, path in given.items():
         if path is not None:
             suffix, content = WRITERS[option]
-            output.check_file(path, (suffix,))
+            check_file(path, (suffix,))
             if path in files:
                 raise BadInput(f"output {str(path)!r} is asked for twice, must be a file for each report")
             files[path] = content
     return files
 
 
-def _run(
-    command: list[str],
-    level: str,
-    seed: int | None,
-    groups: list[str],
-    limits: Limits,
-    known_failures: Path | None,
-) -> Run:
-    """Run the suite on a command, with its progress shown."""
-    known = suite.read_known(known_failures) if known_failures else frozenset()
-    with progress_bar() as bar:
-        return suite.check(
-            command,
-            level=level,
-            seed=seed,
-            groups=groups,
-            limits=limits,
-            known=known,
-            progress=_new_progress(bar),
-        )
-
-
-def _new_progress(bar: Progress) -> Callable[[int, int], None]:
-    """Return what moves a bar on a terminal, and elsewhere writes a line on stderr now and then."""
-    task, last = bar.add_task("cases", total=None), time.monotonic()
-
-    def on_progress(n_done: int, n_total: int) -> None:
-        nonlocal last
-        bar.update(task, completed=n_done, total=n_total)
-        if bar.disable and time.monotonic() - last > EVERY:
-            last = time.monotonic()
-            print(f"{n_done} of {n_total} cases", file=sys.stderr, flush=True)
-
-    return on_progress
-
-
 def show(run: Run) -> None:
     """Print verdicts by group, with every denominator, and what stands against success."""
     groups = [*(reports.summarise(run, group) for group in run.groups()), reports.summarise(run)]
     seen = [verdict for verdict in VERDICTS if verdict == "pass" or groups[-1].counts[verdict]]
-    table = Table("group", "cases", *seen, "worst ulps", "A/B/C", "class", title=_title(run))
-    for column in table.columns[1:]:
-        column.justify = "right"
+    verdicts = [Column(verdict, style=COLOURS.get(verdict, "bold red"), justify="right") for verdict in seen]
+    numbers = [Column(name, justify="right") for name in ("worst ulps", "A/B/C", "class")]
+    table = Table("group", Column("cases", justify="right"), *verdicts, *numbers, title=_title(run))
     for group in groups:
-        cells = [_cell(verdict, group.counts[verdict]) for verdict in seen]
-        worst = "inf" if group.worst_ulps is None else f"{group.worst_ulps:.3g}"
-        table.add_section() if group is groups[-1] else None
-        graded = group.precision != "–"
-        counts = "/".join(map(str, group.classes.values())) if graded else "–"
-        table.add_row(
-            group.group, str(group.cases), *cells, worst if graded else "–", counts, group.precision
-        )
+        counts = [str(group.counts[verdict]) for verdict in seen]
+        graded = ["–", "–"]
+        if group.precision != "–":
+            worst = "inf" if group.worst_ulps is None else f"{group.worst_ulps:.3g}"
+            graded = [worst, "/".join(map(str, group.classes.values()))]
+        row = [group.group, str(group.cases), *counts, *graded, group.precision]
+        table.add_row(*row, end_section=group is groups[-2])
     console = new_console(soft_wrap=True)
     console.print(table)
     if run.speed:
@@ -262,14 +193,10 @@ def _title(run: Run) -> str:
     return escape(f"{name}, level {run.level}, corpus {run.corpus}")
 
 
-def _cell(verdict: str, n: int) -> str:
-    return f"[{COLOURS.get(verdict, 'bold red')}]{n}[/]" if n else "[dim]0[/]"
-
-
 def _verdict(run: Run, total: Any) -> str:
     passed = f"{total.counts['pass']} of {total.cases} cases pass"
     restarts = f", {run.n_restarts} restarts" if run.n_restarts else ""
-    doubt = ": the corpus could not on_progress, which is its own fault" if run.exit_code() == 2 else ""
+    doubt = ": the suite itself is at fault" if run.exit_code() == 2 else ""
     return f"{passed}{restarts}, {run.seconds:.1f} s{doubt}."
 
 
@@ -282,13 +209,13 @@ def write_questions(path: Path, level: str, seed: int | None) -> None:
     choose(level)
     seed = secrets.randbelow(NEW_SEEDS) if seed is None else seed
     if path.suffix == ".jsonl":
-        output.check_file(path, (".jsonl",))
+        check_file(path, (".jsonl",))
         sheet = Sheet(level, seed)
         n = write_lines(sheet, path)
     elif path.suffix:
         raise BadInput(f"--questions = {str(path)!r}, must end in .jsonl, or be a folder for CSV")
     else:
-        with output.writable_folder(path) as folder:
+        with writable_folder(path) as folder:
             if any(folder.iterdir()):
                 raise BadInput(f"--questions = {str(path)!r} is not empty, must be a new folder")
             sheet = Sheet(level, seed)
@@ -305,7 +232,7 @@ def grade_file(answers: Path, questions: Path | None, level: str, seed: int | No
         answers: the file, or a folder of CSV files.
         questions: what they answer, where the key is beside it; else the fresh questions are proved anew.
         level: of the questions, where nothing else tells.
-        seed: likewise; None where the answers on_progress it.
+        seed: likewise; None where the answers tell it.
 
     Raises:
         BadInput: in one line.

@@ -20,8 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mushrooms.orbits import FloatArray, FollowedOrbit
-from scene import Undecided
-from scene.refusal import BadInput
+from scene import BadInput, Undecided
 
 N_BLOCKS = 16
 DIGITS = 16

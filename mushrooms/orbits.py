@@ -8,11 +8,10 @@ adiabatic theory predicts for these intervals. Pictures: `mushrooms.figures.orbi
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,23 +19,24 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
+import fast
 import scene as scenes
+import theory
 from conformance.files import write_file
 from fast.paths import captured, sin_phi
+from fast.starts import initial_states
 from fast.validation import check_energy
-from mushrooms.output import import_arrow
-from scene import Outcome, Scene, State, Stem, Wall
+from mushrooms.output import TABLES, check_file
+from scene import Outcome, Scene, State, Stem, Wall, check_scene
 from scene.geometry import TableAt, table_at
 from scene.laws import is_constant, values
 from scene.mouth import start_time
 from scene.refusal import BadInput, check_count, check_number, check_seed
-from scene.tables import check_scene
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 MAX_COLLISIONS = 1_000_000
 MAX_ORBITS = 1000
-SUFFIXES = (".csv", ".parquet")
 N_PHASES = 48  # of a cycle, for mean lengths of walls
 CROSSINGS = 60.0  # of the table in a cycle, at the energy taken when none is asked for
 
@@ -181,8 +181,6 @@ class FollowedOrbit:
 
         Source: Eq:dEe, Eq:dE.
         """
-        import theory
-
         times = self.states()[:, 0]
         is_captured = self.captured()[:-1]
         if isinstance(self.scene, Stem):
@@ -198,20 +196,17 @@ class FollowedOrbit:
         They are collision, wall, dt, t, x, y, vx, vy, energy; at the arc also place, sin_phi, nu and captured
         (see `Section`).
         """
-        states = self.states()
-        n = len(states)
+        n = len(self.walls) + 1
         found: dict[str, list[Any]] = {"collision": list(range(n)), "wall": [self.start.wall, *self.walls]}
         found["dt"] = [None, *self.steps[:, 0].tolist()]
-        found |= dict(zip(("t", "x", "y", "vx", "vy"), states.T.tolist(), strict=True))
+        found |= dict(zip(("t", "x", "y", "vx", "vy"), self.states().T.tolist(), strict=True))
         found["energy"] = self.energies().tolist()
-        names = ("place", "sin_phi", "nu", "captured")
-        found |= {name: [None] * n for name in names}
+        at_arc = np.full((n, 4), None)
         if not isinstance(self.scene, Stem):
             section = self.section()
-            rows = (section.place, section.sin_phi, section.nu, section.is_captured())
-            for name, row in zip(names, rows, strict=True):
-                for k, number in zip(section.collision.tolist(), row.tolist(), strict=True):
-                    found[name][k + 1] = number
+            hits = (section.place, section.sin_phi, section.nu, section.is_captured())
+            at_arc[section.collision + 1] = np.transpose([hit.astype(object) for hit in hits])
+        found |= dict(zip(("place", "sin_phi", "nu", "captured"), at_arc.T.tolist(), strict=True))
         return found
 
     def write(self, path: Path | str) -> None:
@@ -220,21 +215,9 @@ class FollowedOrbit:
         Raises:
             BadInput: another ending, or pyarrow is not installed.
         """
-        path = Path(path)
-        if path.suffix not in SUFFIXES:
-            raise BadInput(f"output {str(path)!r}: its ending must be one of {', '.join(SUFFIXES)}")
-        if path.suffix == ".parquet":
-            arrow, parquet = import_arrow()
-            table = arrow.table(self.columns()).replace_schema_metadata(
-                {"scene": json.dumps(scenes.to_data(self.scene))}
-            )
-            write_file(path, lambda file: parquet.write_table(table, file))
-            return
-        text, columns = io.StringIO(), self.columns()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
-        write_file(path, text.getvalue())
+        check_file(Path(path), tuple(TABLES))
+        scene = json.dumps(scenes.to_data(self.scene))
+        write_file(Path(path), partial(TABLES[Path(path).suffix], [self.columns()], scene=scene))
 
 
 def usual_energy(scene: Scene, crossings: float = CROSSINGS) -> float:
@@ -276,8 +259,6 @@ def follow(
     if n_cycles is not None:
         n_cycles = check_count("n_cycles", n_cycles, 1, MAX_COLLISIONS)
         end = start_time(scene) + n_cycles * (scene.period or 1.0)
-    from fast.starts import initial_states  # compiles for seconds: only when all arguments are right
-
     rows = initial_states(scene, n_orbits, energy, seed)
     return [from_state(scene, State(row[0], *row[2:]), n_collisions, end) for row in rows.tolist()]
 
@@ -288,8 +269,6 @@ def from_state(scene: Scene, start: State, n_collisions: int, t_end: float = mat
     Raises:
         BadInput: naming field, value and bound.
     """
-    import fast
-
     found = fast.trajectory(scene, start, n_collisions, t_end)
     return FollowedOrbit(scene, start, found.walls, np.asarray(found.steps, np.float64), found.outcome)
 
@@ -302,27 +281,50 @@ class Slot(NamedTuple):
     end: float
 
 
+class _Stretch(NamedTuple):
+    """A wall, or its part beside the mouth, from one end to the other, anticlockwise."""
+
+    wall: Wall
+    begin: tuple[float, float]
+    end: tuple[float, float]
+
+    @property
+    def length(self) -> float:
+        """Return its length."""
+        return math.dist(self.begin, self.end) * (math.pi / 2 if self.wall == "arc" else 1.0)
+
+    def share(self, x: float, y: float) -> float:
+        """Return the position of one of its points, 0 at the begin to 1 at the end."""
+        if self.wall == "arc":
+            return math.atan2(abs(y), x) / math.pi
+        return min(math.dist(self.begin, (x, y)) / (self.length or 1.0), 1.0)
+
+
+def _stretches(now: TableAt) -> list[_Stretch]:
+    """Return the walls anticlockwise from the right end of the cap."""
+    r, w, foot, h = map(float, (now.r, now.w, now.half_width(-now.h), now.h))
+    stem = [
+        _Stretch("left", (-w, 0.0), (-foot, -h)),
+        _Stretch("floor", (-foot, -h), (foot, -h)),
+        _Stretch("right", (foot, -h), (w, 0.0)),
+    ]
+    if isinstance(now.scene, Stem):
+        return [_Stretch("base", (w, 0.0), (-w, 0.0)), *stem]
+    arc = _Stretch("arc", (r, 0.0), (-r, 0.0))
+    if isinstance(now.scene, scenes.Cap):
+        return [arc, _Stretch("base", (-r, 0.0), (r, 0.0))]
+    return [arc, _Stretch("base", (-r, 0.0), (-w, 0.0)), *stem, _Stretch("base", (w, 0.0), (r, 0.0))]
+
+
 def boundary(scene: Scene) -> list[Slot]:
     """Return the walls anticlockwise from the right end of the cap, by their mean lengths in a cycle."""
     check_scene(scene)
-    span = scene.period
-    found = [_lengths(table_at(fp, scene, span * k / N_PHASES)) for k in range(N_PHASES if span else 1)]
-    walls = [wall for wall, _ in found[0]]
-    ends = np.cumsum([0.0, *np.mean([[length for _, length in one] for one in found], axis=0)])
+    times = scene.period * np.arange(N_PHASES if scene.period else 1) / N_PHASES
+    found = [_stretches(table_at(fp, scene, t)) for t in times.tolist()]
+    ends = np.cumsum([0.0, *np.mean([[part.length for part in one] for one in found], axis=0)])
     ends /= ends[-1]
+    walls = [part.wall for part in found[0]]
     return [Slot(*row) for row in zip(walls, ends[:-1].tolist(), ends[1:].tolist(), strict=True)]
-
-
-def _lengths(now: TableAt) -> list[tuple[Wall, float]]:
-    r, w, h = float(now.r), float(now.w), float(now.h)
-    if isinstance(now.scene, scenes.Cap):
-        return [("arc", math.pi * r), ("base", 2 * r)]
-    foot = float(now.half_width(-now.h))
-    side = math.hypot(h, w - foot)
-    around: list[tuple[Wall, float]] = [("left", side), ("floor", 2 * foot), ("right", side)]
-    if isinstance(now.scene, Stem):
-        return [("base", 2 * w), *around]
-    return [("arc", math.pi * r), ("base", r - w), *around, ("base", r - w)]
 
 
 def boundary_map(orbit: FollowedOrbit) -> FloatArray:
@@ -331,38 +333,17 @@ def boundary_map(orbit: FollowedOrbit) -> FloatArray:
     The place runs anticlockwise, 0 to 1. Each wall has the part that `boundary` gives it, and a hit the
     corresponding point of it. The sine is positive along that direction.
     """
-    scene = orbit.scene
-    slots = boundary(scene)
+    slots = boundary(orbit.scene)
     out = np.empty((len(orbit.walls), 2))
     for k, (wall, (_, t, x, y, vx, vy)) in enumerate(zip(orbit.walls, orbit.steps.tolist(), strict=True)):
-        now = table_at(fp, scene, t)
+        now = table_at(fp, orbit.scene, t)
+        own = [pair for pair in zip(slots, _stretches(now), strict=True) if pair[0].wall == wall]
+        slot, part = own[0 if x < 0 else -1]  # of the base beside a mouth the left part comes first
         normal_x, normal_y = now.normal(wall, x, y)
-        own = [slot for slot in slots if slot.wall == wall]
-        slot = own[0] if len(own) == 1 or x < 0 else own[1]
-        share = min(max(_share(now, wall, x, y, len(own) > 1), 0.0), 1.0)
         # Anticlockwise along the wall: the inward normal turned by a right angle, clockwise.
         along = (normal_y * vx - normal_x * vy) / math.hypot(vx, vy)
-        out[k] = slot.begin + share * (slot.end - slot.begin), along
+        out[k] = slot.begin + part.share(x, y) * (slot.end - slot.begin), along
     return out
-
-
-def _share(now: TableAt, wall: Wall, x: float, y: float, is_split: bool) -> float:
-    """Return the position along a wall, anticlockwise, 0 to 1."""
-    if wall == "arc":
-        return math.atan2(y, x) / math.pi
-    if wall == "left":
-        return -y / float(now.h)
-    if wall == "right":
-        return 1 + y / float(now.h)
-    if wall == "floor":
-        foot = float(now.half_width(-now.h))
-        return (x + foot) / (2 * foot)
-    if is_split:
-        r, w = float(now.r), float(now.w)
-        return (x + r if x < 0 else x - w) / (r - w) if r > w else 0.0
-    if isinstance(now.scene, Stem):
-        return (float(now.w) - x) / (2 * float(now.w))
-    return (x + float(now.r)) / (2 * float(now.r))
 
 
 def span_of_nu(scene: Scene) -> tuple[float, float] | None:
@@ -370,7 +351,5 @@ def span_of_nu(scene: Scene) -> tuple[float, float] | None:
     check_scene(scene)
     if not isinstance(scene, scenes.Mushroom):
         return None
-    from theory import Cycle
-
-    cycle = Cycle.of(scene, 15)
+    cycle = theory.Cycle.of(scene, 15)
     return float(cycle.nu_min), float(cycle.nu_max)

@@ -1,17 +1,162 @@
-"""Output: folders and files proved writable before work starts, folders held, the import of pyarrow."""
+"""What commands share: results as lines, what is shown while one waits, files, folders, tables as files."""
 
 from __future__ import annotations
 
+import csv
+import io
+import json
+import math
 import os
 import platform
+import shutil
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from itertools import chain
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, BinaryIO, TextIO
+
+from rich import progress
+from rich.console import Console
 
 from conformance.files import named, part
-from scene.refusal import BadInput
+from scene import BadInput
+
+FIRST, EVERY = 20.0, 60.0  # seconds to the first line, and between lines, where there is no terminal
+CLOCK = time.monotonic
+UNITS = ((1.0, "seconds"), (60.0, "minutes"), (3600.0, "hours"), (86400.0, "days"))
+# The compiled functions that a person waits for, and how long in all; the others take a few seconds.
+SLOW_TO_COMPILE = {
+    "careful_step": "about half a minute",
+    "follow_particles": "about half a minute",
+    "fine": "about ten seconds",
+}
+
+
+@contextmanager
+def announce_compilation() -> Iterator[None]:
+    """Say on stderr when the fast stepper is compiled: numba tells when it has found nothing kept.
+
+    What is compiled one after the other and takes a while together is announced once.
+    """
+    from numba.core import event
+
+    announced = set()
+
+    class Announcer(event.Listener):  # type: ignore[misc]  # numba has no types
+        def on_start(self, compilation: Any) -> None:
+            compiled = compilation.data["dispatcher"]
+            duration = SLOW_TO_COMPILE.get(compiled.py_func.__name__)
+            if duration is not None and compiled.stats.cache_path and duration not in announced:
+                announced.add(duration)
+                what = f"compiling the fast stepper for this machine: {duration}"
+                print(f"{what}; kept for next time", file=sys.stderr, flush=True)
+
+        def on_end(self, compilation: Any) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Announcer()):
+        yield
+
+
+def new_console(*, soft_wrap: bool = False) -> Console:
+    """Return a console for stdout whose tables fit its width, or COLUMNS; a pipe has room enough for them."""
+    size = shutil.get_terminal_size((140, 25))
+    return Console(width=size.columns, height=size.lines, soft_wrap=soft_wrap, highlight=False)
+
+
+def progress_bar() -> progress.Progress:
+    """Return a progress bar on stderr, silent where that is no terminal."""
+    console = Console(stderr=True)
+    return progress.Progress(
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+        transient=True,
+    )
+
+
+class Watch:
+    """Moves a bar on a terminal; elsewhere prints a line on stderr after 20 seconds, and then one a minute.
+
+    Args:
+        bar: see `progress_bar`.
+        name: of the work.
+        unit: what is counted.
+    """
+
+    def __init__(self, bar: progress.Progress, name: str, unit: str) -> None:
+        self._bar, self._name, self._unit = bar, name, unit
+        self._task = bar.add_task(name, total=None)
+        self._begin, self._n_before, self._next = math.nan, 0, math.inf
+
+    def update(self, n_done: int, n_total: int) -> None:
+        """Take note of how many are done; the clock begins with the first call, when all is compiled."""
+        now = CLOCK()
+        if math.isnan(self._begin):
+            self._begin, self._n_before, self._next = now, n_done, now + FIRST
+        self._bar.update(self._task, completed=n_done, total=n_total)
+        if self._bar.disable and now >= self._next:
+            self._next = now + EVERY
+            rate = (n_done - self._n_before) / max(now - self._begin, 1e-9)
+            left = f"{format_duration((n_total - n_done) / rate)} left" if rate else "time left unknown"
+            count = f"{n_done:,} of {n_total:,} {self._unit}"
+            print(f"{self._name}: {count}, {left}", file=sys.stderr, flush=True)
+
+
+def format_duration(seconds: float) -> str:
+    """Return a duration in the unit that suits it."""
+    size, unit = next(u for u in reversed(UNITS) if seconds >= 1.5 * u[0] or u is UNITS[0])
+    n = seconds / size
+    return f"{n:.2g} {unit}" if n < 10 or n > 1e6 else f"{n:.0f} {unit}"
+
+
+def refuse_unheeded(options: Mapping[str, object], why: str) -> None:
+    """Refuse options that nothing here would heed: their user would count on them.
+
+    Args:
+        options: by name; None is one that is not given, True one that has no value.
+        why: nothing heeds them.
+
+    Raises:
+        BadInput: naming the first that is given.
+    """
+    for name, value in options.items():
+        if value is not None:
+            shown = repr(value) if isinstance(value, str) else value
+            given = name if value is True else f"{name} = {shown}"
+            raise BadInput(f"{given} would change nothing here: {why}")
+
+
+def print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str] | None = None) -> None:
+    """Print names, their values and what they mean, a line each; or all as JSON, which keeps every digit.
+
+    A value `x` with a standard error `x_se` is rounded to the error's second digit, and so is `x_theory`.
+    """
+    if as_json:
+        print(json.dumps(pairs, indent=2))
+        return
+    width = max(map(len, pairs))
+    texts = {name: _rounded(name, pairs) for name in pairs}
+    longest = max(map(len, texts.values()))
+    for name, text in texts.items():
+        meaning = (meanings or {}).get(name)
+        print(f"{name:<{width}}  {text:<{longest}}  {meaning}" if meaning else f"{name:<{width}}  {text}")
+
+
+def _rounded(name: str, pairs: dict[str, Any]) -> str:
+    value, error = pairs[name], pairs.get(f"{name.removesuffix('_se').removesuffix('_theory')}_se")
+    if value is None:
+        return "–"
+    if not (isinstance(value, float) and isinstance(error, float) and 0 < error < math.inf):
+        return str(value)
+    places = 1 - math.floor(math.log10(error))
+    return f"{value:.{max(places, 0)}f}"
+
 
 LOCK = ".lock"
 
@@ -96,12 +241,14 @@ def _hold(file: TextIO) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def check_file(path: Path, suffixes: tuple[str, ...]) -> None:
-    """Prove that a file of one of these kinds can be written at `path`.
+def check_file(path: Path | None, suffixes: tuple[str, ...]) -> None:
+    """Prove that a file of one of these kinds can be written at `path`, if one is asked for.
 
     Raises:
         BadInput: one line naming the path and what is wrong with it.
     """
+    if path is None:
+        return
     if path.suffix not in suffixes:
         raise BadInput(f"output {str(path)!r}: its ending must be one of {', '.join(suffixes)}")
     if path.is_dir():
@@ -127,6 +274,43 @@ def import_arrow() -> tuple[Any, Any]:
         how = "pip install 'oscillating-mushrooms[parquet]'"
         raise BadInput(f"a .parquet file needs pyarrow: {how}") from None
     return pyarrow, pyarrow.parquet
+
+
+def write_csv(tables: Iterable[Mapping[str, Any]], file: BinaryIO, *, scene: str = "") -> None:
+    """Write tables of the same columns one below the other; numbers read back to the same bits.
+
+    Args:
+        tables: columns by their names, lists or arrays; one table at least.
+        file: open for binary writing.
+        scene: has no place in a CSV file.
+    """
+    text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    for number, columns in enumerate(tables):
+        if number == 0:
+            writer.writerow(columns)
+        lists = (column.tolist() if hasattr(column, "tolist") else column for column in columns.values())
+        writer.writerows(zip(*lists, strict=True))
+    text.flush()
+    text.detach()
+
+
+def write_parquet(tables: Iterable[Mapping[str, Any]], file: BinaryIO, *, scene: str = "") -> None:
+    """Write tables of the same columns, each as a row group, with a scene as metadata.
+
+    Raises:
+        BadInput: pyarrow is not installed.
+    """
+    arrow, parquet = import_arrow()
+    parts = map(arrow.table, tables)
+    first = next(parts)
+    schema = first.schema.with_metadata({"scene": scene} if scene else None)
+    with parquet.ParquetWriter(file, schema) as writer:  # else it would close itself later, in a page
+        for part in chain([first], parts):
+            writer.write_table(part.cast(schema))
+
+
+TABLES = {".csv": write_csv, ".parquet": write_parquet}  # writers, by the ending of the file
 
 
 def _remove_empty(folders: list[Path]) -> None:

@@ -5,146 +5,37 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-import typer
 from rich.progress import Progress
 
 import fast
 from conformance.audit.runs import scene_named
-from conformance.files import write_file
+from conformance.files import named, write_file
 from fast.starts import one_cycle
 from fast.validation import check_phases
-from mushrooms import compared, output
-from mushrooms.forecast import careful_note
-from mushrooms.main import tell_interrupted
-from mushrooms.output import locked
-from mushrooms.store import conduct, engines
-from mushrooms.store.progress import RunTally, Watch, gain_of, tally_of
-from mushrooms.store.run import StoredRun
-from mushrooms.store.spec import RunSpec
-from mushrooms.terminal import (
-    AsJson,
-    SceneName,
+from mushrooms.output import (
+    Watch,
     announce_compilation,
+    check_file,
+    locked,
     print_pairs,
     progress_bar,
+    writable_folder,
 )
-from scene.refusal import MAX_SEED, BadInput
+from mushrooms.store import conduct
+from mushrooms.store.run import StoredRun
+from mushrooms.store.spec import RunSpec
+from mushrooms.store.summary import RunTally, careful_note, explain_limit, gain_of, measured, tally_of
+from scene import BadInput
 
 Gains = Callable[[], Iterable[Any]]  # returns ln(E/E0) after each cycle, block by block
-MOST_IN_MEMORY, MOST_ON_DISK = 10**8, 10**10
+MOST_IN_MEMORY = 10**8  # particles
 LIMITED = 3  # exit code of a run that a limit has stopped
-FOR_STORED = "needs --out: without a folder nothing is kept"
 NO_BLOCK = "no block was finished: raise the limit, or begin in another folder with a smaller --block"
-
-Particles = Annotated[
-    int, typer.Option(min=1, max=MOST_ON_DISK, help="Number of particles, 1 to 10^8; with --out to 10^10.")
-]
-Energy = Annotated[float, typer.Option(min=0, help="Initial energy v²/2 of every particle, > 0.")]
-Cycles = Annotated[int, typer.Option(min=1, help="Cycles of the walls, at least 1.")]
-Phases = Annotated[
-    str | None,
-    typer.Option(
-        metavar="A,B,...", help="Fractions of a cycle at which energies are stored too; needs --out."
-    ),
-]
-Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of the random starts, 0 to 2^64 - 1.")]
-Threads = Annotated[
-    int | None, typer.Option(min=1, help="Threads; default: all cores, or one per block with --dask.")
-]
-Out = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Folder for the run (ensemble.zarr) and summary.json.")
-]
-Resume = Annotated[
-    bool,
-    typer.Option(
-        "--resume",
-        help="Continue the run in DIR; with more --particles or more --cycles, extend it.",
-    ),
-]
-Dask = Annotated[
-    str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers simulate the blocks.")
-]
-BlockSize = Annotated[
-    int | None,
-    typer.Option(
-        "--block",
-        min=1,
-        max=conduct.LARGEST_BLOCK,
-        help="Particles stored at a time; default: some seconds of work.",
-    ),
-]
-MostCollisions = Annotated[
-    int | None, typer.Option(min=1, help="Stop if a particle makes more collisions than this.")
-]
-MostSeconds = Annotated[float | None, typer.Option(min=0, help="Stop after this time; --resume continues.")]
-Plot = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", help="Draw the energies after each cycle, with the theory (.svg, .png)."),
-]
-
-
-def simulate(
-    scene: SceneName,
-    particles: Particles,
-    energy: Energy,
-    cycles: Cycles = 1,
-    seed: Seed = 0,
-    phases: Phases = None,
-    out: Out = None,
-    resume: Resume = False,
-    dask: Dask = None,
-    block: BlockSize = None,
-    max_collisions: MostCollisions = None,
-    max_seconds: MostSeconds = None,
-    plot: Plot = None,
-    threads: Threads = None,
-    as_json: AsJson = False,
-) -> int:
-    """Simulate an ensemble. Undecided particles are counted, never guessed.
-
-    Prints: particles; collisions; lost (not followed to the end); undecided (lost because the stepper could
-    not decide); careful (collisions computed by the scalar step, some tens of times slower); collision_time
-    (mean time between two collisions of a particle); m1 (mean of log E/E0 per cycle); p_nc (share of cycles
-    without capture); _se (standard error); _theory (prediction); _z (difference in standard errors);
-    ns_per_collision; SHA-256 of the results. Particles that are captured for the whole run count neither in
-    m1 nor in p_nc. docs/ensembles.md explains each line.
-
-    With --out particles are stored block by block. After any interruption --resume continues the run, to the
-    same bits. Exit code 0; 3 if a limit stopped the run; 130 if it was interrupted.
-
-    On stderr: progress and the time left, after 20 s and then every minute; a note if scalar steps took over
-    a tenth of the time; a note if the prediction is the limit of high energies.
-    """
-    if out is None:
-        of_stored = {"--phases": phases, "--resume": resume or None, "--dask": dask, "--block": block}
-        _check_in_memory(
-            particles, {**of_stored, "--max-collisions": max_collisions, "--max-seconds": max_seconds}
-        )
-    if plot is not None:
-        if particles < 2:
-            raise BadInput(f"--particles = {particles}, must be >= 2 for --plot")
-        output.check_file(plot, (".svg", ".png"))
-    spec = RunSpec(scene_named(scene), energy, cycles, seed, _phases(phases))
-    arguments = CliArgs(scene, spec, particles, threads, dask, block, max_collisions, max_seconds)
-    if out is None:
-        found = _in_memory(arguments)
-    else:
-        with output.writable_folder(out) as folder, locked(folder):
-            stored = _on_disk(arguments, folder, resume)
-            if stored is None:
-                return LIMITED
-            found = stored
-    summary, gains = found
-    print_pairs(summary, as_json)
-    tell(compared.explain_limit(spec, summary))
-    if plot is not None:
-        draw_energies(plot, spec, iter(gains()), particles)
-    return 0
 
 
 class CliArgs(NamedTuple):
@@ -164,9 +55,58 @@ class CliArgs(NamedTuple):
         """Return how many threads there are."""
         return self.threads or os.cpu_count() or 1
 
-    def watch(self, bar: Progress, before: RunTally) -> Watch:
+    def watch(self, bar: Progress) -> Callable[[int], None]:
         """Return what shows the progress of the run."""
-        return Watch(bar, self.spec.scene.name or self.scene, self.particles, before)
+        watch = Watch(bar, self.spec.scene.name or self.scene, "particles")
+        return lambda n_done: watch.update(n_done, self.particles)
+
+
+def simulate_scene(
+    scene: str,
+    particles: int,
+    energy: float,
+    cycles: int,
+    seed: int,
+    phases: str | None,
+    out: Path | None,
+    resume: bool,
+    dask: str | None,
+    block: int | None,
+    max_collisions: int | None,
+    max_seconds: float | None,
+    plot: Path | None,
+    threads: int | None,
+    as_json: bool,
+) -> int:
+    """Simulate an ensemble, in memory or in a folder, and print its summary; return the exit code."""
+    if out is None:
+        if particles > MOST_IN_MEMORY:
+            raise BadInput(f"--particles = {particles}, must be 1 to {MOST_IN_MEMORY}; more need --out")
+        of_stored: dict[str, object] = {"--phases": phases, "--resume": resume or None, "--dask": dask}
+        of_stored |= {"--block": block, "--max-collisions": max_collisions, "--max-seconds": max_seconds}
+        for option, value in of_stored.items():
+            if value is not None:
+                raise BadInput(f"{option} needs --out: without a folder nothing is kept")
+    if plot is not None:
+        if particles < 2:
+            raise BadInput(f"--particles = {particles}, must be >= 2 for --plot")
+        check_file(plot, (".svg", ".png"))
+    spec = RunSpec(scene_named(scene), energy, cycles, seed, _phases(phases))
+    arguments = CliArgs(scene, spec, particles, threads, dask, block, max_collisions, max_seconds)
+    if out is None:
+        found = _in_memory(arguments)
+    else:
+        with writable_folder(out) as folder, locked(folder):
+            stored = _on_disk(arguments, folder, resume)
+            if stored is None:
+                return LIMITED
+            found = stored
+    summary, gains = found
+    print_pairs(summary, as_json)
+    tell(explain_limit(spec, summary))
+    if plot is not None:
+        draw_energies(plot, spec, iter(gains()), particles)
+    return 0
 
 
 def _phases(text: str | None) -> tuple[float, ...]:
@@ -178,32 +118,19 @@ def _phases(text: str | None) -> tuple[float, ...]:
         raise BadInput(f"--phases = {text}, must be numbers that rise and lie in (0, 1)") from None
 
 
-def _check_in_memory(particles: int, of_stored: Mapping[str, object]) -> None:
-    """Refuse what only a run on disk can have."""
-    if particles > MOST_IN_MEMORY:
-        raise BadInput(f"--particles = {particles}, must be 1 to {MOST_IN_MEMORY}; more need --out")
-    for option, value in of_stored.items():
-        if value is not None:
-            raise BadInput(f"{option} {FOR_STORED}")
-
-
 def _in_memory(arguments: CliArgs) -> tuple[dict[str, Any], Gains]:
     """Follow an ensemble that is not stored; return its summary and its gains."""
     spec = arguments.spec
-    try:
-        with announce_compilation(), progress_bar() as bar:
-            found = fast.simulate(
-                spec.scene,
-                n_particles=arguments.particles,
-                energy=spec.energy,
-                n_cycles=spec.n_cycles,
-                seed=spec.seed,
-                threads=arguments.threads,
-                progress=arguments.watch(bar, RunTally()).update,
-            )
-    except KeyboardInterrupt:
-        tell_interrupted("nothing is kept without --out")
-        raise
+    with announce_compilation(), progress_bar() as bar:
+        found = fast.simulate(
+            spec.scene,
+            n_particles=arguments.particles,
+            energy=spec.energy,
+            n_cycles=spec.n_cycles,
+            seed=spec.seed,
+            threads=arguments.threads,
+            progress=arguments.watch(bar),
+        )
     with np.errstate(divide="ignore"):
         gains = np.log(found.cycle_energies[found.takes_part()] / spec.energy)
     tally = tally_of({**found._asdict(), "takes_part": found.takes_part()})
@@ -217,30 +144,21 @@ def _on_disk(arguments: CliArgs, folder: Path, resume: bool) -> tuple[dict[str, 
     spec, n = arguments.spec, arguments.particles
     command = spec.command(arguments.scene, n, folder)
     default = conduct.block_of_new(spec, n, arguments.n_threads)
-    try:
-        with announce_compilation():
-            run, damaged = conduct.open_or_create(folder, spec, n, arguments.block, default, command, resume)
-    except OSError as error:
-        raise BadInput(f"output {str(folder)!r}: {error.strerror or error}") from None
-    tell_damaged(damaged)
+    with named(folder), announce_compilation():
+        run = conduct.open_or_create(folder, spec, n, arguments.block, default, command, resume)
     n_before = run.tally.particles
     try:
-        _complete(arguments, run)
-        summary = _summary(spec, run.tally, run.seconds, run.gains, run.sha256())
+        with named(folder):
+            _complete(arguments, run)
+            summary = _summary(spec, run.tally, run.seconds, run.gains, run.sha256())
     except conduct.LimitReached as limit:
         tell(f"{limit}: {_how_to_resume(run, command)}")
         if run.tally.particles == n_before:  # it would stop there again and again
             tell(f"{NO_BLOCK} than {run.shape.block}")
         return None
-    except KeyboardInterrupt:
-        nothing = "no block was finished: nothing is kept"
-        tell_interrupted(nothing if run.first_there() is None else _how_to_resume(run, command))
+    except (KeyboardInterrupt, OSError) as error:  # of a file, or a connection to a cluster
+        error.add_note(_how_to_resume(run, command))
         raise
-    except ConnectionError as error:  # to a cluster
-        raise BadInput(f"{error}: {_how_to_resume(run, command)}") from None
-    except OSError as error:
-        at = f"output {error.filename or str(folder)!r}: {error.strerror or error}"
-        raise BadInput(f"{at}: {_how_to_resume(run, command)}") from None
     data = spec.to_data()
     kept = {name: data[name] for name in ("scene", "energy", "cycles", "seed")} | summary
     write_file(folder / "summary.json", json.dumps(kept) + "\n")
@@ -258,16 +176,14 @@ def _how_to_resume(run: StoredRun, command: str) -> str:
 def _complete(arguments: CliArgs, run: StoredRun) -> None:
     """Follow what a run lacks."""
     before, seconds = run.tally, run.seconds
-    engine = engines.in_process(arguments.threads)
+    engine = conduct.in_process(arguments.threads)
     if arguments.dask:
-        engine = engines.by_dask(arguments.dask, arguments.threads)
+        engine = conduct.by_dask(arguments.dask, arguments.threads)
     with announce_compilation(), progress_bar() as bar:
-        watch = arguments.watch(bar, before)
         conduct.complete(
             run,
             engine,
-            watch.update,
-            lambda block: watch.add(block.tally),
+            arguments.watch(bar),
             max_collisions=arguments.max_collisions,
             max_seconds=arguments.max_seconds,
         )
@@ -284,7 +200,7 @@ def _summary(spec: RunSpec, tally: RunTally, seconds: float, gains: Gains, sha25
         "undecided": tally.undecided,
         "careful": tally.careful,
         "collision_time": flown / tally.met if tally.met else None,
-        **compared.measured(spec, tally.captured, gain_of(gains)),
+        **measured(spec, tally.captured, gain_of(gains)),
         "ns_per_collision": seconds / max(tally.collisions, 1) * 1e9,
         "sha256": sha256,
     }
@@ -294,13 +210,6 @@ def tell(note: str | None) -> None:
     """Print a note on stderr, if there is one."""
     if note is not None:
         print(note, file=sys.stderr)
-
-
-def tell_damaged(numbers: list[int]) -> None:
-    """Say on stderr which blocks of a run are followed again."""
-    if numbers:
-        few = ", ".join(map(str, numbers[:5])) + (" ..." if len(numbers) > 5 else "")
-        tell(f"damaged or broken off: {len(numbers)} blocks ({few}), followed again")
 
 
 def draw_energies(path: Path, spec: RunSpec, gains: Iterator[Any], n_particles: int) -> None:

@@ -31,7 +31,7 @@ from conformance.harness import examples
 from conformance.suite.checks import timing
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
-from mushrooms import bench_solvers as ours
+from mushrooms import bench as ours
 from scene import BadInput, Collision, Horizon, State, Undecided, load
 
 DOCS = Path(__file__).parent.parent / "docs"

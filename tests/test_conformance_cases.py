@@ -44,7 +44,7 @@ from conformance.vectors import (
     request,
 )
 from conformance.verify import Verdict
-from mushrooms.attack import steppers
+from mushrooms.questions import steppers
 from scene import State, catalogue, from_data, load
 from scene.protocol.messages import Command
 

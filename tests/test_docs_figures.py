@@ -22,8 +22,9 @@ from conformance.suite.checks.paths import MAX_HITS, MAX_WAIT
 from conformance.suite.checks.requests import MOST_SAMPLES
 from fast.kernel.follow import LANE_ROWS
 from fast.validation import MAX_CYCLES, MOST_IN_CYCLES, MOST_TO_A_TIME
+from mushrooms.commands import MOST_ON_DISK
 from mushrooms.orbits import MAX_COLLISIONS, MAX_ORBITS
-from mushrooms.simulate import MOST_IN_MEMORY, MOST_ON_DISK
+from mushrooms.simulate import MOST_IN_MEMORY
 from mushrooms.store import conduct
 from mushrooms.store.spec import FIELDS, RunSpec, Shape, shape_of
 from reference.arithmetic import MAX_WORK

@@ -27,8 +27,8 @@ RUN_ELSEWHERE = {
     "corpus.md": {"json"},  # test_docs: the published line
     "cite.md": {"bibtex"},  # test_house_package
     "clusters.md": {"bash"},  # test_docs: with few particles
-    "audit.md": {""},  # test_mushrooms_audit_runs: the commands, and the runs that they make taken up
-    "ensembles.md": {"", "python"},  # test_mushrooms_scale, with fewer particles
+    "audit.md": {""},  # test_mushrooms_audit: the commands, and the runs that they make taken up
+    "ensembles.md": {"", "python"},  # test_mushrooms_simulate, with fewer particles
 }
 INSTALLS = ("pip install", "mushrooms --version", "git clone", "cd oscillating-mushrooms")
 

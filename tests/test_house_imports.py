@@ -19,7 +19,7 @@ BROKEN = re.compile(r"^- +(?=\w)(\S+) -> |^No cycles are allowed in (\S+)\.$", r
 BY_TEXT = re.compile(r"\b(?:import_module|__import__|run_module|find_spec)\b")
 # What numba may change from one release to the next: its passes, its code libraries, its dispatchers' inside.
 PRIVATE = re.compile(r"numba\.core\.(?:compiler|\w+_passes)|JITCodeLibrary|\._(?:compile_for_args|insert)\b")
-LATE = {"fast.__init__", "mushrooms.main"}
+LATE = {"fast.__init__"}
 
 
 def violations(root: Path) -> set[str]:

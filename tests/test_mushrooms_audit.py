@@ -1,34 +1,40 @@
-"""`mushrooms audit`: a report that is complete, stands alone, and goes on where it was broken off."""
+"""`mushrooms audit`: a report that is complete, stands alone and goes on; its runs on disk are taken up."""
 
 from __future__ import annotations
 
 import json
 import re
+import shlex
 import shutil
+import tomllib
 from functools import partial
-from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import unquote
-from xml.dom import minidom
 
 import jsonschema
 import numpy as np
 import pytest
+import xarray
 from support import adiabatic_particles
 from support.depth import deep_among
 from support.harm import held
+from support.pages import assert_stands_alone
 from support.refusals import assert_refused
 from support.schemas import validator
 
 import fast
+import scene as scenes
 from conformance.audit import session
 from conformance.audit.claim import AuditSteppers, Check, Finding
 from conformance.audit.claims import all_claims, select_claims
+from conformance.audit.runs import RUNS, SCENES, Sample, Simulation, draw, run_seed, scene_of
 from conformance.audit.session import AuditResult, AuditSettings
+from mushrooms import audit
 from mushrooms.figures import by_claim
 from mushrooms.output import locked
 from mushrooms.reports import audit_page
 from mushrooms.store import conduct
+from mushrooms.store.run import StoredRun, attributes_of
+from scene import BadInput
 
 pytestmark = pytest.mark.usefixtures("unsynced")
 CHEAP = "M4,M10,X5,N6"
@@ -92,37 +98,17 @@ def test_the_report_meets_its_published_schema(everything):
         validator("report").validate(data)
 
 
-class Links(HTMLParser):
-    def __init__(self):
-        super().__init__()
-        self.sources, self.tags = [], []
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append(tag)
-        self.sources += [value for name, value in attributes if name in ("src", "href", "srcset", "data")]
-
-
 @pytest.mark.parametrize("ids", deep_among([FIGURES, EVERY_FIGURE], EVERY_FIGURE))
 def test_the_page_loads_nothing_from_elsewhere_and_shows_every_figure(everything, ids, monkeypatch):
     monkeypatch.setattr(by_claim, "ALL", [each for each in by_claim.ALL if each.claim in ids])
     page = audit_page.to_html(audit_page.to_data(everything), samples_of(by_claim.ALL))
-    links = Links()
-    links.feed(page)
-    pictures = [source for source in links.sources if not source.startswith("#")]
-    pictures.remove(audit_page.PAPER)  # the one thing elsewhere, a link to follow
+    pictures = assert_stands_alone(page, links=[audit_page.PAPER])
     assert len(pictures) == len(by_claim.ALL) + 1  # and the first screen's
-    assert not {"script", "link", "iframe", "object"} & set(links.tags)
     assert "http" not in re.sub('src="data:[^"]*"', "", page).replace(audit_page.PAPER, "")
     assert len(page) < 1.2e6
     assert "The main numbers" in page
     assert "n = 5 &lt;b&gt;&amp;" in page
-    for source in pictures:
-        kind, _, picture = unquote(source).partition(",")
-        assert kind == "data:image/svg+xml"
-        minidom.parseString(picture)
-        assert "sd 0.0" not in picture or re.search(r"sd 0\.\d{4}", picture)  # numbers to read are not cut
-        targets = re.findall(r'href="([^"]*)"', picture)
-        assert all(target.startswith(("#", "data:")) for target in targets)
+    assert not any(re.search(r"peak 0\.\d{0,3} wide", picture) for picture in pictures)  # numbers are not cut
     for claim in everything.claims:
         assert f'id="{claim.id}"' in page
 
@@ -201,7 +187,8 @@ def test_another_seed_is_refused_and_broken_findings_are_made_again(call, tmp_pa
     assert_refused(refused, "holds another run: seed = ", " there, ", "asked for", "ergodic@1e7")
     assert held(tmp_path) == before
     for path in (tmp_path / "findings").iterdir():
-        path.write_bytes(path.read_bytes()[:100])
+        content = path.read_bytes()
+        path.write_bytes(content[:90] + bytes([content[90] ^ 1]) + content[91:])
     assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
     assert len(blocks) == 6
 
@@ -277,23 +264,11 @@ def test_sources_are_looked_at_before_anything_is_examined(tmp_path, monkeypatch
 
 @pytest.mark.deep
 def test_resumed_with_other_claims_a_report_has_both(call, tmp_path, blocks):
-    """Never fewer: what other settings would leave out is not given up."""
     for ids, wanted in (("X5,N6", "X5,N6"), ("M10", "M10,X5,N6"), ("N6", "M10,X5,N6")):
         done = call("--only", ids, "--out", tmp_path, "--resume", "--json")
         assert done.code == 0
         assert [finding["id"] for finding in json.loads(done.out)["findings"]] == wanted.split(",")
     assert len(blocks) == 6
-    before = (tmp_path / "report.json").read_bytes()
-    for more in (["--seed", 1], ["--full"]):
-        done = call("--only", "N6", "--out", tmp_path, "--resume", *more)
-        assert_refused(done, "a report of 3 claims", "seed = 0; 1 are asked for")
-    assert (tmp_path / "report.json").read_bytes() == before
-
-
-@pytest.mark.parametrize(("only", "words"), [("", "empty"), (" ", "empty"), (",,", "must name a claim")])
-def test_no_claim_at_all_is_refused(call, tmp_path, only, words):
-    assert_refused(call("--only", only, "--out", tmp_path / "a"), "--only ", words)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_one_audit_or_run_holds_a_folder(call, command_line, tmp_path):
@@ -305,26 +280,6 @@ def test_one_audit_or_run_holds_a_folder(call, command_line, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_part_with_a_flipped_bit_is_not_taken_up(call, tmp_path, blocks):
-    """Wherever it is: in numbers, names or a finding's text."""
-    call("--only", "X5", "--out", tmp_path)
-    fresh = json.loads((tmp_path / "report.json").read_text("utf-8"))
-    random = np.random.default_rng(4)
-    for path in sorted(tmp_path.rglob("*")):
-        is_chunk = path.is_file() and "/c/0" in path.as_posix()
-        if is_chunk or path.suffix == ".finding" or path.name.startswith("2."):  # or a block's marker
-            content = bytearray(path.read_bytes())
-            content[random.integers(len(content))] ^= 1 << int(random.integers(8))
-            path.write_bytes(content)
-    ended = call("--only", "X5", "--out", tmp_path, "--resume")
-    assert ended.code == 0
-    assert ended.err.count("damaged or broken off: 2 blocks (0, 2), followed again") == 2
-    assert len(blocks) == 6 + 4
-    again = json.loads((tmp_path / "report.json").read_text("utf-8"))
-    for name in ("name", "seed", "sha256", "m1"):
-        assert [run[name] for run in again["runs"]] == [run[name] for run in fresh["runs"]]
-
-
 def test_without_resume_no_run_is_replaced(call, tmp_path, blocks):
     call("--only", "X5", "--out", tmp_path)
     before = held(tmp_path)
@@ -333,3 +288,232 @@ def test_without_resume_no_run_is_replaced(call, tmp_path, blocks):
     assert held(tmp_path) == before
     assert call("--only", "N6", "--out", tmp_path).code == 0  # it has no runs
     assert len(blocks) == 6
+
+
+SMALL = {
+    "breathing": Simulation("breathing-circle", 60.0, 100, 270, n_cycles=2, phases=(0.25, 0.5)),
+    "mouth": Simulation("only-mouth", 60.0, 100, 270, phases=(0.1, 0.5, 0.9)),
+    "cycles": Simulation("moving-cap", 40.0, 100, 270, n_cycles=3),
+}
+N_QUICK, SEED = 100, 5
+
+
+@pytest.fixture
+def followed(monkeypatch):
+    """Have small blocks; list the ranges that are followed, (first particle, how many), without probes."""
+    block_ranges, go_on = [], fast.go_on
+    monkeypatch.setattr(conduct, "MOST_BLOCK", 64)
+
+    def noted(scene, **options):
+        if options["n_particles"] != conduct.PROBED:
+            block_ranges.append((options.get("first", 0), options["n_particles"]))
+        return go_on(scene, **options)
+
+    monkeypatch.setattr(fast, "go_on", noted)
+    return block_ranges
+
+
+def kept(folder, run, size="quick", *, resume=True, seed=SEED):
+    """Return a run's sample as an audit in the folder has it."""
+    audit.check_runs(folder, [run], seed, resume)
+    return draw(
+        partial(audit.follow_run, folder / "runs" / run.name, resume), run, size=size, seed=seed, threads=1
+    )
+
+
+def at_once(run, size="quick"):
+    return draw(fast.simulate, run, size=size, seed=SEED, threads=1)
+
+
+def assert_same(found, wanted):
+    """Hold that two samples are one to the bit; times are none."""
+    for name in set(Sample._fields) - {"run", "seconds"}:
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name), err_msg=name)
+
+
+def made(command_line, run, folder, n, *more):
+    """Make a run as the audit's command says, with n particles."""
+    words = shlex.split(audit.command(run, "quick", SEED, folder))[1:]
+    words[words.index("--particles") + 1] = n
+    ended = command_line(*words, "--threads", 1, "--json", *more)
+    assert ended.code == 0, ended.err
+    return json.loads(ended.out)
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_a_kept_run_is_the_one_at_once_and_quick_is_the_begin_of_full(tmp_path, followed, name):
+    run = SMALL[name]
+    quick, full = at_once(run), at_once(run, "full")
+    followed.clear()
+    assert_same(kept(tmp_path, run, resume=False), quick)
+    assert followed == [(0, 64), (64, 36)]
+    assert_same(kept(tmp_path, run, "full"), full)
+    assert followed[2:] == [(64, 64), (128, 64), (192, 64), (256, 14)]
+    assert_same(kept(tmp_path, run), quick)  # of the larger run
+    assert len(followed) == 6
+    np.testing.assert_array_equal(quick.s, full.s[: quick.n])
+
+
+@pytest.mark.parametrize("name", ["breathing", "mouth"])
+def test_what_simulate_has_made_is_taken_up(command_line, tmp_path, followed, name):
+    """One with more particles too; and the audit's report tells the digest that `simulate` prints."""
+    run = SMALL[name]
+    summary = made(command_line, run, tmp_path, N_QUICK)
+    found = kept(tmp_path, run)
+    assert found.sha256 == summary["sha256"]
+    assert_same(found, at_once(run))
+    larger = made(command_line, run, tmp_path, 300)
+    followed.clear()
+    assert_same(kept(tmp_path, run), found)
+    wanted = kept(tmp_path, run, "full")
+    assert followed == []
+    assert_same(wanted, at_once(run, "full"))
+    assert made(command_line, run, tmp_path, 300)["sha256"] == larger["sha256"]  # as it was
+
+
+def test_of_a_larger_run_only_what_the_audit_needs_is_followed(command_line, tmp_path, followed):
+    run = SMALL["mouth"]
+    wanted = at_once(run)
+    larger = made(command_line, run, tmp_path, 300)
+    place = tmp_path / "runs" / run.name
+    for number in (1, 3):  # broken off there
+        (place / "blocks" / f"{number}.marker").unlink()
+    followed.clear()
+    assert_same(kept(tmp_path, run), wanted)
+    assert followed == [(64, 64)]
+    assert made(command_line, run, tmp_path, 300)["sha256"] == larger["sha256"]
+    assert followed[1:] == [(192, 64)]
+
+
+def test_another_run_or_one_in_use_is_refused_before_anything_is_followed(command_line, tmp_path, followed):
+    run = SMALL["mouth"]
+    made(command_line, run, tmp_path, N_QUICK)
+    followed.clear()
+    place = str(tmp_path / "runs" / run.name)
+    seeds = f"seed = {run_seed(SEED, run)} there, {run_seed(6, run)} asked for"
+    for change, words in (
+        ({"seed": 6}, [place, seeds]),
+        ({"run": run._replace(phases=(0.1, 0.5))}, ["phases = [0.1, 0.5, 0.9] there, [0.1, 0.5] asked for"]),
+        ({"run": run._replace(phases=())}, ["phases = [0.1, 0.5, 0.9] there, [] asked for"]),
+        ({"resume": False}, [place, "--resume takes it up"]),
+    ):
+        with pytest.raises(BadInput) as refusal:
+            kept(tmp_path, **{"run": run, **change})
+        assert all(word in str(refusal.value) for word in words), refusal.value
+    with locked(tmp_path / "runs" / run.name), pytest.raises(BadInput, match="one run at a time"):
+        kept(tmp_path, run)
+    assert followed == []
+
+
+@pytest.mark.usefixtures("followed")
+def test_a_run_with_more_cycles_is_refused_before_any_is_followed(tmp_path):
+    run = SMALL["cycles"]
+    asked = {"energy": run.energy, "seed": run_seed(SEED, run), "phases": run.phases, "threads": 1}
+    longer = {"n_particles": 5, "n_cycles": 4, "progress": lambda _: None}
+    audit.follow_run(tmp_path / "runs" / run.name, True, scene_of(run), **asked, **longer)
+    with pytest.raises(BadInput, match="cycles = 4 there, 3 asked for: a run only grows"):
+        audit.check_runs(tmp_path, [run], SEED, True)
+
+
+@pytest.mark.usefixtures("followed")
+def test_a_run_is_held_while_the_audit_follows_it(command_line, tmp_path, monkeypatch):
+    run, go_on = SMALL["mouth"], fast.go_on
+    words = shlex.split(audit.command(run, "quick", SEED, tmp_path))[1:]
+    refused = []
+
+    def meanwhile(scene, **options):
+        monkeypatch.setattr(fast, "go_on", go_on)
+        refused.append(command_line(*words))
+        return go_on(scene, **options)
+
+    monkeypatch.setattr(fast, "go_on", meanwhile)
+    assert kept(tmp_path, run).n_particles == N_QUICK
+    assert_refused(refused[0], "one run at a time")
+
+
+ensemble = StoredRun.ensemble
+
+
+def cut_off(run, n):
+    """Read whole blocks."""
+    return ensemble(run, min(-(-n // run.shape.block) * run.shape.block, run.tally.particles))
+
+
+@pytest.mark.usefixtures("followed")
+def test_a_run_read_in_whole_blocks_is_found_out(tmp_path, monkeypatch):
+    run = SMALL["mouth"]
+    monkeypatch.setattr(StoredRun, "ensemble", cut_off)
+    sizes = ("quick", "full", "quick")
+    found = [kept(tmp_path, run, size).sha256 for size in sizes]
+    assert found != [at_once(run, size).sha256 for size in sizes]
+
+
+def test_the_commands_of_an_audit_make_its_runs(command_line, tmp_path, monkeypatch):
+    """Each asks for what the audit asks for, of a scene that `simulate` knows; nothing is made yet."""
+    monkeypatch.chdir(tmp_path)
+    for more, size in (([], "quick"), (["--full"], "full")):
+        ended = command_line("audit", "--commands", "--out", "here", "--seed", 3, *more)
+        assert ended.code == 0
+        lines = ended.out.splitlines()
+        runs = audit.needed(all_claims(), size)
+        assert {run.name for run in runs} == {name for name, run in RUNS.items() if run.n_particles(size)}
+        assert len({run_seed(3, run) for run in runs}) == len(lines) == len(runs)
+        for line, run in zip(lines, runs, strict=True):
+            words = shlex.split(line)
+            assert words[:3] == ["mushrooms", "simulate", run.scene]
+            options = dict(zip(words[3:-1:2], words[4:-1:2], strict=True))
+            assert (float(options["--energy"]), int(options["--cycles"])) == (run.energy, run.n_cycles)
+            assert int(options["--seed"]) == run_seed(3, run)
+            assert int(options["--particles"]) == run.n_particles(size)
+            assert options["--out"] == f"here/runs/{run.name}"
+            assert tuple(map(float, filter(None, options.get("--phases", "").split(",")))) == run.phases
+            assert scene_of(run).name == run.scene
+    ended = command_line("audit", "--commands", "--only", "X5", "--json")
+    assert len(json.loads(ended.out)) == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_audit_s_scenes_are_known_by_name(command_line, tmp_path, name):
+    for option, read in (("--toml", tomllib.loads), ("--json", json.loads)):
+        ended = command_line("scenes", name, option)
+        assert scenes.from_data(read(ended.out)) == SCENES[name]
+    path = tmp_path / "a.toml"
+    path.write_text(command_line("scenes", name, "--toml").out)
+    assert scenes.load(path) == SCENES[name]
+
+
+@pytest.mark.usefixtures("followed")
+def test_what_is_not_there_yet_has_no_phase(tmp_path):
+    """A run of three blocks of which only the second is kept."""
+    spec = audit.spec_of(SMALL["mouth"], SEED)
+    run = conduct.open_or_create(tmp_path, spec, 150, 64, 64, "", False)
+    block_range = list(run.missing())[1]
+    run.keep(block_range, audit.conduct.follow(spec, block_range, 1))
+    with xarray.open_zarr(tmp_path / "ensemble.zarr", mask_and_scale=False) as found:
+        there = np.zeros(150, bool)
+        there[64:128] = True
+        np.testing.assert_array_equal((found.phase_captured.values >= 0).all(axis=(1, 2)), there)
+        np.testing.assert_array_equal((found.phase_captured.values == -1).all(axis=(1, 2)), ~there)
+        np.testing.assert_array_equal(np.isfinite(found.phase_energies.values).all(axis=(1, 2)), there)
+
+
+@pytest.mark.usefixtures("followed")
+def test_without_phases_a_run_says_what_it_always_said(tmp_path):
+    run = SMALL["cycles"]
+    kept(tmp_path, run)
+    place = tmp_path / "runs" / run.name
+    assert "phases" not in attributes_of(place)
+    assert "phases" not in audit.spec_of(run, SEED).to_data()  # nor in what markers are held to
+    assert not list(place.rglob("phase*"))
+
+
+def test_the_stand_in_s_particles_depend_on_their_numbers_alone():
+    options = {"energy": 1e4, "seed": 3, "phases": (0.5,)}
+    size = adiabatic_particles.TOGETHER
+    whole = adiabatic_particles.simulate(scenes.load("moving-cap"), n_particles=size + 500, **options)
+    part = adiabatic_particles.simulate(
+        scenes.load("moving-cap"), n_particles=200, first=size - 100, **options
+    )
+    for name in fast.Ensemble._fields[1:-2]:
+        np.testing.assert_array_equal(getattr(whole, name)[size - 100 : size + 100], getattr(part, name))

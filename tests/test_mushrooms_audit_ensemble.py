@@ -182,7 +182,7 @@ BAD = {
         "E0 takes several values, 1 and 2 among them",
     ),
     "no such energy": (table(), ["--energy", "7"], "0 energies, must be 2 or more"),
-    "energy 0": (table(), ["--energy", "0"], "--energy = 0.0, must be finite and > 0"),
+    "energy 0": (table(), ["--energy", "0"], "'--energy': 0.0, must be finite and > 0"),
     "odd flag": (table("E0,E1,captured", "1e4,2e4,2", "1e4,2e4,0"), [], "captured = 2.0, must be 0 or 1"),
     "late times": (
         table("E0,E1,t_in", "1e4,2e4,99", "1e4,3e4,98"),

@@ -1,32 +1,36 @@
-"""The commands check, ask and verify: exit codes, what is printed, and what is refused."""
+"""The commands check, ask, verify and bench: exit codes, what is printed and written, and what is refused."""
 
 from __future__ import annotations
 
 import json
 import math
 import re
+import shutil
 import subprocess
 import sys
 from functools import partial
 from pathlib import Path
-from urllib.parse import unquote
 from xml.etree import ElementTree
 
 import msgspec
 import pytest
+from matplotlib.text import Text
 from support.depth import deep_but
 from support.faulty_servers import command
+from support.pages import assert_stands_alone
 from support.refusals import assert_refused
 
 import conformance
 import scene as scenes
 from conformance import plain, vectors
+from conformance.bench import record, workloads
 from conformance.suite import pytest_suite
 from conformance.suite import run as suite
 from conformance.suite.checks import ensembles
 from conformance.suite.session import Session
 from conformance.suite.symmetry import Transform
-from mushrooms import check
+from mushrooms import bench, output
+from mushrooms.reports import bench_page
 from scene import State
 
 PYTHON = [sys.executable, str(Path(conformance.__file__).parent / "harness" / "python" / "stepper.py")]
@@ -42,7 +46,7 @@ def _few(monkeypatch):
     monkeypatch.setattr(suite, "choose", lambda *_: found)
     monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
-    monkeypatch.setattr(check, "EVERY", math.inf)
+    monkeypatch.setattr(output, "FIRST", math.inf)
 
 
 @pytest.fixture
@@ -80,15 +84,7 @@ def test_a_good_stepper_is_accepted_and_reported(call, tmp_path):
     assert "Worst cases" in page
     assert "Speed against error" in page
     assert "property/mirror" in page
-    assert_stands_alone(page, n_figures=page.count("<figure"))
-
-
-def assert_stands_alone(page: str, n_figures: int) -> None:
-    assert "<script" not in page
-    assert not re.search(r'(src|href)="(?!data:|#)', page)
-    images = re.findall(r'src="data:image/svg\+xml,([^"]+)"', page)
-    assert len(images) == n_figures >= 3
-    assert all("<svg" in unquote(image) for image in images)
+    assert len(assert_stands_alone(page)) == page.count("<figure") >= 3
 
 
 def test_a_bad_stepper_is_not(call, tmp_path):
@@ -138,11 +134,12 @@ def test_reports_of_broken_sessions_are_written_too(call, tmp_path, name):
 
 
 def test_a_piped_run_tells_on_stderr_how_far_it_is(call, monkeypatch):
-    monkeypatch.setattr(check, "EVERY", 0.0)
+    monkeypatch.setattr(output, "FIRST", 0.0)
+    monkeypatch.setattr(output, "EVERY", 0.0)
     _, _, err = call("--groups", "static-stem", "--", *command("honest"))
     lines = err.splitlines()
     assert len(lines) > 5
-    assert all(re.fullmatch(r"\d+ of \d+ cases", line) for line in lines)
+    assert all(re.fullmatch(r"check: \d+ of \d+ cases, .*(left|unknown)", line) for line in lines)
 
 
 BROKEN = "import sys\nprint('[red]a line before', file=sys.stderr)\nimport no_such_module\n"
@@ -326,4 +323,97 @@ def test_a_bad_trajectory_is_refused_in_one_line(content, options, message, tmp_
     path = tmp_path / ("steps.json" if content[0] == "{" else "steps.csv")
     path.write_text(content)
     assert_refused(command_line("verify", path, *options), message)
-    assert_refused(command_line("verify", tmp_path / "none.json"), "cannot be read")
+    assert_refused(command_line("verify", tmp_path / "none.json"), "none.json': No such file")
+
+
+ROOT = Path(__file__).parent.parent
+FILES = ["bench.html", "bench.json", "bench.svg"]
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch):
+    """Two workloads, and a few questions."""
+    monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1] + workloads.RULES[2:3])
+    monkeypatch.setattr(bench, "QUESTIONS", {"quick": 2, "full": 64})
+    monkeypatch.setattr(bench, "FURTHER", {"quick": 40, "full": 2000})
+    monkeypatch.setattr(bench, "REPEATS", {"quick": 2})
+    monkeypatch.setattr(bench, "PATHS", {"quick": (1, 4)})
+
+
+@pytest.fixture
+def call_bench(command_line):
+    return partial(command_line, "bench")
+
+
+@pytest.mark.deep
+def test_a_benchmark_is_written_whole_and_again(call_bench, tmp_path, monkeypatch):
+    one = [sys.executable, "-m", "fast"]
+    code, out, err = call_bench("--quick", "--out", tmp_path / "one", "--seed", 5, "--", *one)
+    assert (code, re.sub("compiling the fast stepper .*\n", "", err)) == (0, "")
+    assert sorted(p.name for p in (tmp_path / "one").iterdir()) == FILES
+    found = record.read(tmp_path / "one" / "bench.json")
+    assert (found.size, found.seed, found.questions) == ("quick", 5, 2)
+    names = {p.solver for p in found.points}
+    assert {"proof, 200 digits", "fast, lanes", "fast, pairs", "plain Python"} < names
+    assert f"command {' '.join(one)}" in names
+    if shutil.which("cc"):
+        assert names >= {"lean C", "steps, flight/10", "steps, flight/100", "steps, flight/1000"}
+        assert "baselines.c" in found.machine.compiled["lean C"]
+    else:
+        assert found.not_run["lean C, time steps"] == "no C compiler is installed"
+    assert {p.further for p in found.points if p.solver == "fast, lanes"} == {40}
+    assert {p.workload for p in found.points} == {"breathing-disk", "moving-cap-1e4"}
+    assert "fast, careful" in out
+    page = (tmp_path / "one" / "bench.html").read_text("utf-8")
+    assert not re.search(r"(src|href)=\"(?!data:)", page)
+    assert page.count("<img") == 2
+    assert (tmp_path / "one" / "bench.svg").read_text("utf-8").count("moving-cap-1e4") >= 1
+
+    # The same seed asks the same questions, so that the errors are the same to the last bit.
+    monkeypatch.setattr(bench_page, "growth", lambda *_: b"<svg/>")  # drawn above
+    monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1])
+    assert call_bench("--quick", "--out", tmp_path / "two", "--seed", 5)[0] == 0
+    again = record.read(tmp_path / "two" / "bench.json")
+    errors = [{(p.workload, p.solver): p.relative for p in r.points} for r in (found, again)]
+    assert all(errors[0][key] == errors[1][key] for key in errors[1])
+
+
+def test_the_page_on_speed_shows_what_the_record_holds(call_bench):
+    kept = record.read(ROOT / "docs" / "bench" / "bench.json")
+    text = (ROOT / "docs" / "speed.md").read_text("utf-8")
+    assert kept.size == "full"
+    code, table, _ = call_bench("--table", ROOT / "docs" / "bench" / "bench.json")
+    assert code == 0
+    rows = [[cell.strip() for cell in line.split("|")] for line in table.splitlines()]
+    shown = [row for row in rows if f"| {row[1]} | {row[2]} | {row[3]} | {row[5]} |" in text]
+    assert len(shown) == 1 + text.count(" of 64 |") > 14  # the head, and every row of the page
+    code, lanes, _ = call_bench("--table", ROOT / "docs" / "bench" / "bench.json", "--workload", "all")
+    assert code == 0
+    rows = [[cell.strip() for cell in line.split("|")] for line in lanes.splitlines()[2:]]
+    assert all(re.search(rf"\| {row[1]}: .* \| {row[2]} \| {row[4]} \|\n", text) for row in rows)
+    assert_refused(call_bench("--table", "absent.json"), "absent.json")
+    refused = call_bench("--table", ROOT / "docs" / "bench" / "bench.json", "--workload", "nowhere")
+    assert_refused(refused, "moving-cap-1e7")
+    for name, n in kept.growth.lasts.items():
+        assert f"{name}: {'over ' if n >= kept.growth.collisions else ''}{n:.0f}" in text
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    red, green, blue = (c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+@pytest.mark.deep
+def test_the_kept_figure_reads_at_a_glance():
+    """No two labels touch, none is smaller than 9 points; colours have contrast and marks."""
+    kept = record.read(ROOT / "docs" / "bench" / "bench.json")
+    for colour in bench_page.COLOURS.values():
+        assert 1.05 / (luminance(colour) + 0.05) >= 4.5
+    assert len(set(bench_page.MARKS.values())) == len(bench_page.COLOURS)
+    figure = bench_page.headline(kept)
+    figure.draw_without_rendering()
+    boxes = [Text.get_window_extent(text) for text in figure.axes[0].texts if text.get_text()]
+    assert len(boxes) == 9
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 9

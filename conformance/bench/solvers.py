@@ -1,7 +1,7 @@
 """Solvers: steppers that step a workload's states and say how long that took, timed in turns and graded.
 
 A solver whose answers differ between runs is left out. (The lanes are timed on whole flights, and graded
-on one round from the same states: see `mushrooms.bench_solvers`.)
+on one round from the same states: see `mushrooms.bench`.)
 
 Warm-up first (compilation, caches), which also says how often a run must take the steps to be long enough
 for the clock. Then all solvers take one run each, again and again, so that a disturbance of the machine

@@ -7,9 +7,10 @@ the theory at this energy. For scenes without measured rates the limit of high e
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from itertools import chain
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,10 +20,10 @@ from matplotlib.figure import Figure
 
 import theory
 from fast.validation import check_energy
-from mushrooms.compared import NO_THEORY, begins_widest, known, predicted
 from mushrooms.figures import style as plots
 from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, FloatArray, new_figure
 from mushrooms.store.spec import RunSpec
+from mushrooms.store.summary import NO_THEORY, begins_widest, known, predicted
 from scene import Mushroom, Scene, check_scene
 from scene.refusal import BadInput, shown
 
@@ -131,7 +132,7 @@ def histogram(scene: Scene, energy: float, gains: Gains, n_particles: int | None
     else:
         figure, [(axes, rest)] = panels(1)
         draw(axes, rest, bars, found)
-        _never_captured(axes, float(found.peak[0]))
+        draw_never_captured(axes, float(found.peak[0]))
     axes.set_title(_title(scene, energy, bars, n_particles))
     figure.legend(loc="outside lower center")
     return figure
@@ -169,9 +170,8 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
             cycles[shown], line, color=BLACK, linewidth=1.5, label=f"theory, m1 = {line[1]:.4f} a cycle"
         )
         spread = float(theory.predict(scene, 6).sd) * np.sqrt(cycles[shown])
-        for edge in (line - spread, line + spread):
-            above.plot(cycles[shown], edge, color=BLACK, linewidth=0.9, linestyle=":")
-        above.plot([], [], color=BLACK, linewidth=0.9, linestyle=":", label="theory ± its sd")
+        for edge, label in ((line - spread, "theory ± its sd"), (line + spread, "_")):
+            above.plot(cycles[shown], edge, color=BLACK, linewidth=0.9, linestyle=":", label=label)
     above.set(xlabel="cycle of the walls", ylabel="ln(E/E0)", title=_title(scene, energy, bars, n_particles))
     above.xaxis.get_major_locator().set_params(integer=True)
     draw_limit(below, scene, bars) if found is None else draw(below, None, bars, found)
@@ -194,22 +194,30 @@ def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
     top = 1.3 * float(heights.max())
     axes.set(xlabel=AXIS, ylabel="density", xlim=(bars.edges[0], bars.edges[-1]), ylim=(0, top))
     axes.locator_params(axis="x", nbins=6)
-    try:
-        limit = theory.energies(scene) if isinstance(scene, Mushroom) and begins_widest(scene) else None
-    except NO_THEORY:
-        return
-    if limit is None:
-        return
+    with suppress(*NO_THEORY):
+        if isinstance(scene, Mushroom) and begins_widest(scene):
+            draw_adiabatic(axes, theory.energies(scene), bars.edges, "at high energies")
+
+
+def draw_adiabatic(axes: Axes, limit: theory.Energies, edges: FloatArray, name: str) -> None:
+    """Draw the energies of the adiabatic theory: a density of the captured, a line for the others."""
     if limit.p_nc < 1:
-        x = np.linspace(bars.edges[0], bars.edges[-1], N_PLACES)
-        density = np.diff(limit.captured_below(x)) / np.diff(x)
-        label = "theory, captured, at high energies"
-        axes.plot((x[1:] + x[:-1]) / 2, density, color=ORANGE, linewidth=1.4, label=label)
+        label = f"theory, captured, {name}"
+        _draw_density(axes, limit.captured_below, edges, N_PLACES, color=ORANGE, linewidth=1.4, label=label)
     if limit.p_nc > 0:
-        _never_captured(axes, float(limit.s_nc))
+        draw_never_captured(axes, float(limit.s_nc))
 
 
-def _never_captured(axes: Axes, place: float) -> None:
+def _draw_density(
+    axes: Axes, below: Callable[[FloatArray], FloatArray], edges: FloatArray, n: int, **style: Any
+) -> None:
+    """Draw the density between n places of what has these shares below a place."""
+    x = np.linspace(edges[0], edges[-1], n)
+    axes.plot((x[1:] + x[:-1]) / 2, np.diff(below(x)) / np.diff(x), **style)
+
+
+def draw_never_captured(axes: Axes, place: float) -> None:
+    """Draw where theory has the particles that are never captured."""
     axes.axvline(place, color=ORANGE, linestyle="--", linewidth=1.2, label="theory, never captured")
 
 
@@ -221,10 +229,9 @@ def draw(axes: Axes, rest: Axes | None, bars: Gathered, found: theory.FiniteEner
         axes.set(xlabel=AXIS)
     else:
         _residuals(rest, bars.counts, shares * bars.n, edges)
-    x = np.linspace(edges[0], edges[-1], 4 * N_BARS + 1)  # finer, single atoms of the theory would show
-    total = np.diff(found.cdf(x)) / np.diff(x)
     label = f"theory at this energy, peak {found.peak[1] ** 0.5:.4f} wide"
-    axes.plot((x[1:] + x[:-1]) / 2, total, color=BLACK, linewidth=1.3, label=label)
+    n = 4 * N_BARS + 1  # finer, single atoms of the theory would show
+    _draw_density(axes, found.cdf, edges, n, color=BLACK, linewidth=1.3, label=label)
     top = 1.3 * max(float(heights.max()), float((shares / np.diff(edges)).max()))  # spikes are cut
     axes.set(xlim=(edges[0], edges[-1]), ylim=(0, top), ylabel="density")
 

@@ -15,11 +15,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.optimize import minimize, minimize_scalar
 
 import theory
+from mushrooms.figures.style import new_figure
 from scene import Fourier, Mushroom
 
 N_NODES = 400  # of the integral over log w
@@ -132,8 +132,7 @@ def phase_diagram(phases: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 def draw_phase_diagram(n_phases: int = 16, n_sizes: int = 6) -> Figure:
     """Draw m1 of the moving cap over the phase of the stem and the amplitude."""
     phases, sizes = 2 * np.pi * np.arange(n_phases + 1) / n_phases, 0.6 * np.arange(1, n_sizes + 1) / n_sizes
-    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
-    axes: Axes = figure.add_subplot()
+    figure, axes = new_figure(7.0, 3.6)
     found = phase_diagram(phases, sizes)
     filled = axes.contourf(phases / np.pi, sizes, found, levels=12, cmap="viridis")
     figure.colorbar(filled, label="$m_1$ per cycle")
@@ -144,8 +143,7 @@ def draw_phase_diagram(n_phases: int = 16, n_sizes: int = 6) -> Figure:
 def draw_loops(deepest: tuple[float, ...] = (1.0, 6.0, 20.0), n: int = 40) -> Figure:
     """Draw m1 of both directions and the supremum over the narrowest mouth, for several greatest depths."""
     mouths = np.geomspace(1e-3, 0.9, n)
-    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
-    axes: Axes = figure.add_subplot()
+    figure, axes = new_figure(7.0, 3.6)
     for i, depth in enumerate(deepest):
         for label, dash, m1 in (
             ("anticlockwise", "-", [Loop(depth, 0.0, w).m1 for w in mouths]),

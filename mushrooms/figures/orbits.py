@@ -54,12 +54,9 @@ def trajectory(orbit: FollowedOrbit) -> Figure:
     states = orbit.states()
     begin, end = float(states[0, 0]), float(states[-1, 0])
     if orbit.scene.period:
-        for line in tables.walls(orbit.scene, end):
-            axes.plot(*line, color=plots.GREY, linewidth=1.2, linestyle="--")
-        axes.plot([], [], color=plots.GREY, linewidth=1.2, linestyle="--", label="walls at the end")
-    for line in tables.walls(orbit.scene, begin):
-        axes.plot(*line, color=plots.BLACK, linewidth=2)
-    axes.plot([], [], color=plots.BLACK, linewidth=2, label="walls at the start")
+        at_end: dict[str, Any] = {"color": plots.GREY, "linewidth": 1.2, "linestyle": "--"}
+        tables.draw_walls(axes, orbit.scene, end, label="walls at the end", **at_end)
+    tables.draw_walls(axes, orbit.scene, begin, color=plots.BLACK, linewidth=2, label="walls at the start")
     points = states[:, 1:3]
     lines = LineCollection(
         list(np.stack([points[:-1], points[1:]], axis=1)),
@@ -237,12 +234,11 @@ def energy_in_time(orbit: FollowedOrbit) -> Figure:
             axes.plot(time, free - free[0], color=FREE, linestyle="--", linewidth=1.3, label=label)
     except (theory.NotCovered, theory.NotConverged):
         pass  # no theory of this table: the simulation alone
-    if isinstance(orbit.scene, Mushroom):
-        captured = orbit.captured()
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], captured[:-1], [False]]).astype(int)))
-        for k, (begin, end) in enumerate(edges.reshape(-1, 2)):
-            label = "captured" if k == 0 else "_"
-            axes.axvspan(time[begin], time[end], color=CAPTURED, alpha=0.15, linewidth=0, label=label)
+    captured = orbit.captured()
+    if isinstance(orbit.scene, Mushroom) and captured.any():
+        shade: dict[str, Any] = {"color": CAPTURED, "alpha": 0.15, "linewidth": 0, "label": "captured"}
+        across = axes.get_xaxis_transform()
+        axes.fill_between(time, 0, 1, where=captured, step="post", transform=across, **shade)
     axes.set(xlabel="t / T" if span else "t [time]", ylabel="ln(E/E0)", title=_title([orbit]))
     figure.legend(loc="outside lower center", ncols=2)
     return figure
@@ -276,6 +272,7 @@ def exponents(
     return figure
 
 
+@rc_context(plots.STYLE)
 def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAMES) -> None:
     """Write a GIF of the walls in motion and the particle with its last flights behind it.
 
@@ -288,21 +285,17 @@ def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAM
     states = orbit.states()
     times = np.linspace(states[0, 0], states[-1, 0], n_frames)
     places, last = orbit.at(times), np.searchsorted(states[:, 0], times, side="right") - 1
-    span = orbit.scene.period
+    unit, name = orbit.scene.period or 1.0, "t/T" if orbit.scene.period else "t"
+    axes = tables.new_slide(orbit.scene)
+    axes.plot(*places[0], "o", color=FREE, markersize=6, markerfacecolor="none", label="start")
+    (trail,) = axes.plot([], [], color=plots.SKY, linewidth=1)
+    (dot,) = axes.plot([], [], "o", color=plots.BLACK, markersize=6)
+    axes.figure.legend(loc="outside lower center")
 
-    def prepare(axes: Axes) -> Callable[[int], str]:
-        axes.plot(*places[0], "o", color=FREE, markersize=6, markerfacecolor="none", label="start")
-        (trail,) = axes.plot([], [], color=plots.SKY, linewidth=1, animated=True)
-        (dot,) = axes.plot([], [], "o", color=plots.BLACK, markersize=6, animated=True)
-        axes.figure.legend(loc="outside lower center")
+    def show(k: int) -> None:
+        trail.set_data(*np.vstack([states[max(0, last[k] - TRAIL) : last[k] + 1, 1:3], places[k]]).T)
+        dot.set_data(*places[k : k + 1].T)
+        title = f"{plots.plain(orbit.scene.name)}   {name} = {(times[k] - times[0]) / unit:.2f}"
+        axes.set_title(title)
 
-        def show(k: int) -> str:
-            path = np.vstack([states[max(0, last[k] - TRAIL) : last[k] + 1, 1:3], places[k]])
-            trail.set_data(*path.T)
-            dot.set_data(*places[k : k + 1].T)
-            turn = (times[k] - times[0]) / span if span else times[k] - times[0]
-            return f"{plots.plain(orbit.scene.name)}   {'t/T' if span else 't'} = {turn:.2f}"
-
-        return show
-
-    tables.write_frames(orbit.scene, times.tolist(), prepare, file)
+    tables.write_frames(orbit.scene, axes, times.tolist(), show, file)

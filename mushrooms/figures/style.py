@@ -58,8 +58,9 @@ def power(number: float) -> str:
     if 1e-2 <= number < 1e4:
         return f"{number:.4g}"
     mantissa, _, exponent = f"{number:.3e}".partition("e")
-    factor = mantissa.rstrip("0").rstrip(".") + r"\cdot"
-    return rf"${'' if number == float(f'1e{exponent}') else factor}10^{{{int(exponent)}}}$"
+    digits = mantissa.rstrip("0").rstrip(".")
+    factor = "" if digits == "1" else rf"{digits}\cdot"
+    return rf"${factor}10^{{{int(exponent)}}}$"
 
 
 def new_figure(width: float, height: float, n_rows: int = 1, n_columns: int = 1) -> tuple[Figure, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from mpmath import fp
 from PIL import Image
 
@@ -32,6 +33,14 @@ def walls(scene: Scene, t: float) -> list[np.ndarray]:
     return [np.transpose(line) for line in table_at(fp, scene, t).outline()]
 
 
+def draw_walls(axes: Axes, scene: Scene, t: float, **style: Any) -> list[Line2D]:
+    """Draw the walls at time t; a label is that of the first line."""
+    lines = [axes.plot(*line, **style)[0] for line in walls(scene, t)]
+    for line in lines[1:]:
+        line.set_label("_")
+    return lines
+
+
 def phases(scene: Scene, n: int = N_PHASES) -> list[float]:
     """Return n times [time] evenly over one cycle; a static table has the single time 0."""
     check_scene(scene)
@@ -47,8 +56,7 @@ def chords(scene: Scene, t: float, n: int = N_CHORDS) -> np.ndarray:
     """
     points = np.hstack(walls(scene, t))
     top, bottom = points[1].max(), points[1].min()
-    speed = 1e6 * points[0].max()
-    direction = 0.61  # radians: off every symmetry
+    speed, direction = 1e6 * points[0].max(), 0.61  # radians: off every symmetry
     vx, vy = float(speed * np.cos(direction)), float(speed * np.sin(direction))
     state = State(t, 0.0, float(0.37 * (top or bottom)), vx, vy)
     path = [(state.x, state.y)]
@@ -80,8 +88,7 @@ def new_strip(scene: Scene, width: float, max_height: float) -> Figure:
         zip(np.ravel(grid), times, plots.phase_colours(len(times)), strict=True)
     ):
         axes.plot(*chords(scene, t), color=plots.GREY, linewidth=0.6)
-        for line in walls(scene, t):
-            axes.plot(*line, color=colour, linewidth=2, solid_capstyle="butt")
+        draw_walls(axes, scene, t, color=colour, linewidth=2, solid_capstyle="butt")
         _set_frame(axes, scene)
         axes.set_title(f"t/T = {k}/{len(times)}" if len(times) > 1 else "static")
         axes.label_outer()
@@ -96,56 +103,55 @@ def write_picture(scene: Scene, suffix: str, file: BinaryIO) -> None:
         suffix: ".svg", ".png" or ".pdf": the table at each phase, with chords; ".gif": the walls in motion.
         file: open for binary writing.
     """
-    times, span, name = phases(scene, N_FRAMES), scene.period, plots.plain(scene.name)
-
-    def title(k: int) -> str:
-        return f"{name}   t/T = {times[k] / span:.2f}" if span else f"{name}   static"
-
-    if suffix == ".gif":
-        write_frames(scene, times, lambda _: title, file)
-    else:
+    times, name = phases(scene, N_FRAMES), plots.plain(scene.name)
+    if suffix != ".gif":
         figure = new_strip(scene, 7.2, 6.0)
         figure.suptitle(name)
         plots.save(figure, file, suffix)
+        return
+    axes = new_slide(scene)
+
+    def show(k: int) -> None:
+        axes.set_title(f"{name}   " + (f"t/T = {times[k] / scene.period:.2f}" if scene.period else "static"))
+
+    write_frames(scene, axes, times, show, file)
+
+
+@rc_context(plots.STYLE)
+def new_slide(scene: Scene) -> Axes:
+    """Return the axes of a figure that holds the table throughout its cycle and fills a slide."""
+    left, right, bottom, top = _frame(scene)
+    width = min(WIDEST, max(HIGHEST, HIGHEST * (right - left) / (top - bottom)))
+    figure = plots.new_figure(width / DOTS_PER_INCH, HIGHEST / DOTS_PER_INCH)[0]
+    axes = figure.axes[0]
+    figure.set_dpi(DOTS_PER_INCH)
+    _set_frame(axes, scene)
+    return axes
 
 
 @rc_context(plots.STYLE)
 @plots.any_letters()
 def write_frames(
-    scene: Scene, times: Sequence[float], prepare: Callable[[Axes], Callable[[int], str]], file: BinaryIO
+    scene: Scene, axes: Axes, times: Sequence[float], show: Callable[[int], None], file: BinaryIO
 ) -> None:
     """Write a GIF of the walls at these times [time].
 
     Args:
         scene: the table.
+        axes: of `new_slide`.
         times: one for each frame.
-        prepare: receives the axes and draws what moves besides the walls, with animated=True. It returns a
-            function that receives the number of a frame, moves it, and returns the title.
+        show: receives the number of a frame, and draws what moves besides the walls.
         file: open for binary writing.
     """
-    left, right, bottom, top = _frame(scene)
-    width = min(WIDEST, max(HIGHEST, HIGHEST * (right - left) / (top - bottom)))
-    figure, axes = plots.new_figure(width / DOTS_PER_INCH, HIGHEST / DOTS_PER_INCH)
-    _set_frame(axes, scene)
-    style: dict[str, Any] = {"color": plots.BLUE, "linewidth": 2, "animated": True}
-    lines = [axes.plot(*line, **style)[0] for line in walls(scene, times[0])]
-    move = prepare(axes)
-    title = axes.set_title(" ")
-    title.set_animated(True)
-    # The static part is drawn once, and each frame over a copy of it: ten times as fast.
-    figure.set_dpi(DOTS_PER_INCH)
-    canvas: Any = figure.canvas
-    canvas.draw()
-    still = canvas.copy_from_bbox(figure.bbox)
-    moving = sorted((a for a in axes.get_children() if a.get_animated()), key=lambda a: a.get_zorder())
+    lines = draw_walls(axes, scene, times[0], color=plots.BLUE, linewidth=2)
+    canvas: Any = axes.figure.canvas
     frames = []
     for k, t in enumerate(times):
-        canvas.restore_region(still)
-        title.set_text(move(k))
+        show(k)
         for line, points in zip(lines, walls(scene, t), strict=True):
             line.set_data(*points)
-        for artist in moving:
-            figure.draw_artist(artist)
+        canvas.draw()
+        canvas.figure.set_layout_engine("none")  # the axes stay where the first frame has them
         picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
         frames.append(picture.quantize(method=Image.Quantize.FASTOCTREE))
     duration = round(1000 / FRAMES_PER_SECOND)

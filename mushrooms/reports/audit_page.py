@@ -22,7 +22,7 @@ from conformance.audit.runs import Sample, run_seed, scene_of
 from conformance.audit.session import AuditResult
 from conformance.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, share, spread
 from mushrooms import __version__
-from mushrooms.figures import by_claim, cycles
+from mushrooms.figures import by_claim
 from mushrooms.figures import style as plots
 from mushrooms.reports.page import embed, pull, render
 
@@ -215,7 +215,7 @@ def _first_figure(samples: by_claim.Samples) -> str:
     if by_claim.MAIN_RUN not in samples:
         return ""
     with rc_context(plots.STYLE):
-        return embed(plots.svg(cycles.energies([samples[by_claim.MAIN_RUN]])))
+        return embed(plots.svg(by_claim.energies([samples[by_claim.MAIN_RUN]])))
 
 
 def _place(finding: Data) -> tuple[list[int], str, int]:

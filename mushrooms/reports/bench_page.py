@@ -1,4 +1,4 @@
-"""The benchmark's page: the plots, and the numbers behind them."""
+"""The pages and figures of the benchmark: speed against error, error growth, and the numbers behind them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,15 @@ import statistics
 from collections.abc import Sequence
 from typing import Any
 
-from conformance.bench.record import Point, Record, quartiles
-from mushrooms.figures import speed as figures_of_speed
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from conformance.bench.record import Growth, Point, Record, quartiles
+from mushrooms.figures import style as plots
 from mushrooms.reports.page import embed, render
-from scene.refusal import BadInput
+from scene import BadInput
 
 ALL = "all"  # workloads, in one table
 BESIDE = "moving-cap-1e7"  # what its times are compared with
@@ -22,7 +27,7 @@ def to_html(record: Record, speed: bytes) -> bytes:
         "bench.html.jinja",
         record=record,
         speed=embed(speed),
-        growth=embed(figures_of_speed.growth(record.growth)),
+        growth=embed(growth(record.growth)),
         rows=[_row(p) for p in record.points],
     )
     return page.encode("utf-8")
@@ -104,3 +109,134 @@ def middle_and_worst(errors: Sequence[float | None], form: str) -> tuple[str, st
         return "–", "–"
     numbers = [math.inf if e is None else e for e in errors]
     return f"{statistics.median(numbers):{form}}", f"{max(numbers):{form}}"
+
+
+# Contrast with white is 4.5 to 1 and more; families differ by their marks too, whatever colours one sees.
+COLOURS = {
+    "proof": "#B34A00",
+    "compiled": plots.BLUE,
+    "interpreted": "#00775A",
+    "time-stepping": "#666666",
+    "fixed-step": "#7A5C00",
+    "lean": plots.BLACK,
+    "example": "#A3417A",
+    "command": "#7A3E9D",
+}
+MARKS = {
+    "proof": "s",
+    "compiled": "o",
+    "interpreted": "D",
+    "time-stepping": "v",
+    "fixed-step": "^",
+    "lean": "P",
+    "example": "h",
+    "command": "*",
+}
+# In one panel for a first look: a workload, and what its steppers are called.
+HEADLINE = "moving-cap-1e7"
+NAMED = {
+    "fast, lanes": "fast, many particles",
+    "fast, a call": "fast, a call from Python",
+    "fast, pairs": "fast, 31 digits",
+    "lean C": "Newton without checks, C",
+    "plain Python": "plain Python",
+    "solve_ivp, rtol 1e-12": "scipy's solve_ivp",
+    "steps, flight/100": "time steps, C",
+    "proof, 200 digits": "reference, with proof",
+}
+PLACES = {"time-stepping": ((-14, 0), "right"), "proof": ((6, 14), "right")}  # of their names, by family
+LABEL = 9  # size of text [points]
+MOST_DIGITS, LEAST_DIGITS = 300.0, 0.5
+LEAST_NS = 10.0
+BINARY64 = 53 * math.log10(2)
+TICKS = (1, 2, 4, 8, 16, 32, 64, 128)
+
+
+def digits(error: float) -> float:
+    """Return correct digits for a relative error: an exact binary64 answer has all of its own."""
+    return min(max(-math.log10(error), LEAST_DIGITS), MOST_DIGITS) if error > 0 else BINARY64
+
+
+@rc_context(plots.STYLE)
+def headline(record: Record) -> Figure:
+    """Draw time per collision against correct digits of a few steppers on one workload, for a first look."""
+    workload = next((w for w in record.workloads if w.name == HEADLINE), record.workloads[-1])
+    points = [
+        p
+        for p in record.points
+        if p.workload == workload.name and (p.solver in NAMED or p.family in ("proof", "command"))
+    ]
+    figure, axes = plots.new_figure(8.0, 5.0)
+    axes.set(xscale="log", yscale="log", xlim=(0.65, record.digits), ylim=(LEAST_NS, 1e8))
+    axes.set_xticks(TICKS, map(str, TICKS))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.tick_params(labelsize=LABEL)
+    axes.axvline(BINARY64, color=plots.BLACK, linewidth=0.8, linestyle=":")
+    for p in points:
+        _mark(axes, p)
+        share = _share_wrong(p)
+        name = NAMED.get(p.solver, "" if p.family == "proof" else short_name(p.solver)) + (
+            f",\n{100 * share:.1g} % wrong walls" if share else ""
+        )
+        style: dict[str, Any] = {"textcoords": "offset points", "va": "center", "color": COLOURS[p.family]}
+        place, style["ha"] = PLACES.get(p.family, ((9, 0), "left"))
+        axes.annotate(name, (_digits_of(p)[0], statistics.median(p.ns)), place, fontsize=LABEL + 1, **style)
+    axes.text(BINARY64 * 1.04, 4e7, "binary64", fontsize=LABEL)
+    label = "correct digits of an answer (mark: median; bar: to the worst)"
+    axes.set(xlabel=label, ylabel="ns per collision", title=f"One core, {workload.name}: {workload.what}")
+    return figure
+
+
+def _mark(axes: Any, p: Point) -> None:
+    colour, (first, ns, third) = COLOURS[p.family], quartiles(p.ns)
+    middle, worst = _digits_of(p)
+    if p.right:
+        axes.plot([middle, middle], [first, third], color=colour, marker="_", markersize=6, linewidth=1.2)
+        axes.plot([worst, middle], [ns, ns], color=colour, marker="|", markersize=7, linewidth=1.2)
+        axes.plot(middle, ns, marker=MARKS[p.family], markersize=5.5, color=colour, linestyle="none")
+
+
+def _share_wrong(p: Point) -> float:
+    return p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
+
+
+def _digits_of(p: Point) -> tuple[float, float]:
+    """Return the correct digits of the median and of the worst right answer."""
+    if not p.relative:
+        return LEAST_DIGITS, LEAST_DIGITS
+    return digits(statistics.median(p.relative)), digits(max(p.relative))
+
+
+def short_name(solver: str) -> str:
+    """Return a solver's label."""
+    for part in ("proof, ", " digits", "fast, ", "solve_ivp, ", "example in ", "command ", "steps, flight"):
+        solver = solver.replace(part, "1" if part == "steps, flight" else "")
+    return plots.plain(solver if len(solver) < 18 else solver[:17] + "…")
+
+
+@rc_context(plots.STYLE)
+def growth(found: Growth) -> bytes:
+    """Draw errors along trajectories with the Lyapunov slope and the predicted bound."""
+    figure, axes = plots.new_figure(7.2, 4.4)
+    count = np.arange(1, found.collisions + 1)
+    colours = (
+        COLOURS["interpreted"],
+        plots.BLUE,
+        COLOURS["example"],
+        COLOURS["proof"],
+        COLOURS["fixed-step"],
+    )
+    for (name, errors), colour, mark in zip(found.followers.items(), colours, "os^Dv", strict=False):
+        shown = np.where(np.array(errors) > 0, errors, np.nan)
+        every = max(1, len(count) // 16)
+        axes.plot(
+            count, shown, color=colour, marker=mark, markevery=every, markersize=5, linewidth=1, label=name
+        )
+    label = "one ulp a step, grown"
+    axes.plot(count, found.bound, color=plots.BLACK, linestyle="--", linewidth=1, label=label)
+    early = count[: 2 * (found.collisions // 3)]
+    label = f"Lyapunov slope: {found.rate:.2f} decimals a collision"
+    axes.plot(early, 10.0 ** (found.rate * (early - 1) - 32), color=plots.GREY, linestyle=":", label=label)
+    axes.set(yscale="log", xlabel="collisions", ylabel="error, relative to table and speed", ylim=(1e-60, 10))
+    axes.legend(loc="lower right")
+    return plots.svg(figure)

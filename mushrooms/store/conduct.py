@@ -1,31 +1,185 @@
-"""A run, from what there is of it to its end: the specification, what is there, limits, and what is missing.
+"""A run, from what there is of it to its end: what is there, limits, what is missing, and what follows it.
 
-No decision rests on the time of day: limits and rates are read from a clock that only goes forwards.
+An engine is handed ranges of particles and yields blocks, in any order: in this process, or from workers of
+a Dask cluster. The bits of a particle depend on its number alone: it does not matter which engine, machine or
+block followed it, nor how often it was tried. No decision rests on the time of day: limits and rates are read
+from a clock that only goes forwards.
 """
 
 from __future__ import annotations
 
+import logging
 import math
 import shutil
+import sys
 import time
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import closing
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mushrooms.forecast import expected_collisions
-from mushrooms.store.engines import Engine, follow
+import fast
+import mushrooms
 from mushrooms.store.run import Block, BlockRange, StoredRun, attributes_of, is_run
-from mushrooms.store.spec import Arrays, RunSpec, difference, made_by, shape_of
-from scene.refusal import BadInput
+from mushrooms.store.spec import Arrays, RunSpec, columns, difference, made_by, paused_of, shape_of
+from mushrooms.store.summary import expected_collisions
+from scene import BadInput
+
+# Receives the number of finished particles of the block in progress; its exceptions end the engine.
+OnProgress = Callable[[int], None]
+Following = Generator[tuple[BlockRange, Block], None, None]
+Engine = Callable[[RunSpec, Iterator[BlockRange], OnProgress], Following]
+RETRIES = 10  # of a block whose workers fail or die
+BLOCKS_AHEAD = 2  # waiting for each thread of the cluster: no worker idles, and few blocks are in memory
+CONNECT_TIMEOUT = 10.0  # seconds in which a scheduler must answer
+POLL_INTERVAL = 0.5  # seconds after which limits are looked at while no block comes
+
+
+def follow(
+    spec: RunSpec, block_range: BlockRange, threads: int | None, on_progress: OnProgress | None = None
+) -> Block:
+    """Follow the particles of a block, from their starts or from where they were.
+
+    Raises:
+        BadInput: as `fast.go_on`.
+    """
+    before = None
+    if block_range.before is not None:
+        before = paused_of(block_range.before.arrays, spec.energy, block_range.before.seconds)
+    paused = fast.go_on(
+        spec.scene,
+        n_particles=block_range.n,
+        energy=spec.energy,
+        n_cycles=spec.n_cycles,
+        seed=spec.seed,
+        first=block_range.first,
+        threads=threads,
+        phases=spec.phases,
+        progress=on_progress,
+        before=before,
+    )
+    ensemble = paused.ensemble
+    return Block(columns(paused), ensemble.seconds * ensemble.threads)
+
+
+def in_process(threads: int | None) -> Engine:
+    """Return the engine that follows one block after another with all threads."""
+
+    def engine(spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress) -> Following:
+        for block_range in block_ranges:
+            yield block_range, follow(spec, block_range, threads, on_progress)
+
+    return engine
+
+
+def follow_elsewhere(version: str, spec: RunSpec, block_range: BlockRange, threads: int) -> Block:
+    """Follow a block on a worker, which must be of the version that asks.
+
+    Raises:
+        BadInput: it is of another.
+    """
+    if version != mushrooms.__version__:
+        raise BadInput(f"a worker has version {mushrooms.__version__}, must be {version}")
+    return follow(spec, block_range, threads)
+
+
+def by_dask(address: str, threads: int | None) -> Engine:
+    """Return the engine that hands blocks to the workers of a Dask scheduler.
+
+    Args:
+        address: of the scheduler, as tcp://host:8786.
+        threads: for each block; 1 by default, as a worker has as many blocks at a time as it has threads.
+
+    Raises:
+        BadInput: dask.distributed is not installed, or no scheduler answers.
+        ConnectionError: the engine; the cluster is lost.
+    """
+    try:
+        from distributed import Client
+        from distributed.comm import CommClosedError, resolve_address
+    except ImportError:
+        raise BadInput("--dask needs dask.distributed: pip install 'oscillating-mushrooms[scale]'") from None
+
+    def engine(spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress) -> Following:
+        try:
+            resolve_address(address)  # of what is no address the client is made, and cannot be closed
+            # Not the process's default: what else computes with Dask here would wait for this one, even
+            # after it has failed to connect.
+            client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
+        # Dask logs pages of its own when a cluster is lost, which are of no use to go on with the run.
+        log = logging.getLogger("distributed.client")
+        level = log.level
+        log.setLevel(logging.CRITICAL + 1)
+        try:
+            with client:
+                yield from _hand_out(client, spec, block_ranges, on_progress, threads or 1)
+        except (CancelledError, CommClosedError) as error:
+            why = type(error).__name__
+            raise ConnectionError(f"--dask = {address}: the scheduler has gone ({why})") from None
+        except RuntimeError as error:
+            if "deserialization" not in str(error):
+                raise
+            raise ConnectionError(f"--dask = {address}: the scheduler must have this project too") from None
+        finally:
+            log.setLevel(level)
+
+    return engine
+
+
+def _hand_out(
+    client: Any, spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress, threads: int
+) -> Following:
+    """Keep every worker busy, and yield what comes back; what is still out is dropped at the end."""
+    from distributed import KilledWorker, wait
+
+    out, n_killed = dict[Any, BlockRange](), Counter[int]()
+
+    def submit(block_range: BlockRange) -> None:
+        asked_for = (mushrooms.__version__, spec, block_range, threads)
+        options = {"pure": False, "retries": RETRIES, "priority": -block_range.number}
+        out[client.submit(follow_elsewhere, *asked_for, **options)] = block_range
+
+    try:
+        while True:
+            n_wanted = max(1, BLOCKS_AHEAD * sum(client.nthreads().values())) - len(out)
+            for block_range in islice(block_ranges, max(0, n_wanted)):
+                submit(block_range)
+            if not out:
+                return
+            on_progress(0)
+            try:
+                with client.as_current():
+                    done = wait(list(out), timeout=POLL_INTERVAL, return_when="FIRST_COMPLETED").done
+            except TimeoutError:
+                continue
+            for future in done:
+                block_range = out.pop(future)
+                try:
+                    block = future.result()
+                except KilledWorker:
+                    # So many workers died with it that the scheduler gave it up; it may not be its fault.
+                    n_killed[block_range.number] += 1
+                    if n_killed[block_range.number] > RETRIES:
+                        raise ConnectionError(
+                            f"--dask: workers die of block {block_range.number} again and again"
+                        ) from None
+                    submit(block_range)
+                    continue
+                yield block_range, block
+    finally:
+        client.cancel(list(out))
+
 
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
 LEAST_BLOCK, MOST_BLOCK = 256, 2**17  # particles: a thread's lanes are full, and memory stays small
 ROOM = 2**12  # particles of a new run's block, however few it has: it may be widened
-LARGEST_BLOCK = 2**20  # particles that may be asked for: in memory some gigabytes
 BLOCK_BYTES = 2**26  # on disk; in memory several times that
 LANES_OF_A_THREAD = 128  # particles that a thread needs to be quick
 MOST_BLOCKS = 10**6
@@ -62,8 +216,8 @@ def open_or_create(
     resume: bool,
     *,
     at_least: bool = False,
-) -> tuple[StoredRun, list[int]]:
-    """Return the run of a folder, new or gone on with, and the numbers of the blocks found damaged.
+) -> StoredRun:
+    """Return the run of a folder, new or gone on with; blocks found damaged are told of on stderr.
 
     Args:
         folder: held by the caller.
@@ -99,7 +253,10 @@ def open_or_create(
     _check_disk(run)
     if is_there:
         run.describe()
-    return run, damaged if is_there else []
+        if damaged:
+            few = ", ".join(map(str, damaged[:5])) + (" ..." if len(damaged) > 5 else "")
+            print(f"damaged or broken off: {len(damaged)} blocks ({few}), followed again", file=sys.stderr)
+    return run
 
 
 def read_description(folder: Path, spec: RunSpec, more: dict[str, object]) -> dict[str, Any]:
@@ -126,7 +283,6 @@ def complete(
     run: StoredRun,
     engine: Engine,
     on_progress: Callable[[int], None],
-    on_block: Callable[[Block], None] = lambda _block: None,
     *,
     n_particles: int | None = None,
     max_collisions: int | None = None,
@@ -141,7 +297,6 @@ def complete(
         run: to be completed so far; what is missing beyond stays as it is.
         engine: that follows.
         on_progress: called with the number of finished particles, again and again.
-        on_block: called with each block, before it is kept.
         n_particles: how many of the first particles; by default all.
         max_collisions: of a particle: stop if one makes more.
         max_seconds: on the clock: stop after them.
@@ -170,7 +325,6 @@ def complete(
                 under_way.result()
             under_way = writer.submit(run.keep, block_range, block)
             there += block_range.n
-            on_block(block)
             on_progress(max(0, there))
         if under_way is not None:
             under_way.result()

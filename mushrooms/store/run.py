@@ -5,6 +5,10 @@ zarr writes and reads the arrays (`spec`).
 A block is finished when its marker is there: a small sealed file, written after the block's arrays, that
 holds their SHA-256. A block without a marker, or whose arrays do not have these sums, is followed again. So
 neither the moment at which a process ends nor damage to a file can change a result.
+
+A finished run is exported as one table, block by block, with the same bits. A row is a particle. What it has
+for each cycle, minimum of nu or wall stands in columns of its own, counted from 1, or named by the wall:
+cycle_energies_1, t_in_1_1, wall_counts_arc.
 """
 
 from __future__ import annotations
@@ -14,17 +18,33 @@ import json
 import warnings
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
+from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import zarr
 
 from conformance.files import sealed, unsealed, write_file
 from fast import Ensemble
-from mushrooms.store.progress import RunTally, tally_of
-from mushrooms.store.spec import FIELDS, SCHEMA, Array, Arrays, RunSpec, Shape, made_by, shape_of, spec_of
-from scene.refusal import BadInput
+from mushrooms.output import TABLES, check_file
+from mushrooms.store.spec import (
+    FIELDS,
+    LANES,
+    SCHEMA,
+    WALLS,
+    Array,
+    Arrays,
+    RunSpec,
+    Shape,
+    made_by,
+    paused_of,
+    shape_of,
+    spec_of,
+)
+from mushrooms.store.summary import RunTally, tally_of
+from scene import BadInput
 
 GROUP, MARKERS = "ensemble.zarr", "blocks"
 DESCRIPTION = "run.marker"  # among the markers: the group's attributes once more, sealed
@@ -288,12 +308,12 @@ class StoredRun:
         Raises:
             BadInput: a block is missing or damaged.
         """
-        n_blocks, fields = -(-n // self.shape.block), dict[str, Any]()
-        for name in DIGESTED:
-            parts = [array for number in range(n_blocks) if (array := self.part(number, name)) is not None]
-            fields[name] = np.concatenate(parts)[:n] if parts else np.zeros((n, self.shape.n_cycles, 0))
+        numbers = range(-(-n // self.shape.block))
+        arrays = {
+            name: np.concatenate([self.read(k, name) for k in numbers])[:n] for name in self.shape.names
+        }
         seconds = self.seconds * n / max(self.tally.particles, 1)
-        return Ensemble(energy0=self.spec.energy, seconds=seconds, threads=1, **fields)
+        return paused_of(arrays, self.spec.energy, seconds).ensemble
 
     def _count(self, marker: Marker, tally: RunTally) -> None:
         self._markers[marker.number] = marker
@@ -376,3 +396,47 @@ def open_run(folder: Path) -> StoredRun:
     run = StoredRun(folder, spec, shape, found["command"])
     run.load()
     return run
+
+
+MAX_COLUMNS = 10_000
+TIMES = ("seconds", "threads")
+
+
+def write_npz(run: StoredRun, file: BinaryIO) -> None:
+    """Write the fields of `fast.Ensemble` (times left out) as numpy reads them."""
+    fields = run.ensemble(run.shape.n_particles)._asdict()
+    held = {name: array for name, array in fields.items() if np.size(array) and name not in TIMES}
+    np.savez(file, **held)
+
+
+def _tables(run: StoredRun) -> Iterator[Arrays]:
+    """Yield each block as columns by their names."""
+    shape, names = run.shape, [name for name in run.shape.names if name != LANES]
+    n_columns = sum(int(np.prod(shape.of(name, 1, shape.n_cycles))) for name in names)
+    if n_columns > MAX_COLUMNS:
+        raise BadInput(f"a table of {n_columns} columns, must be at most {MAX_COLUMNS}: read it with xarray")
+    for number in range(shape.n_blocks):
+        first = number * shape.block
+        columns: Arrays = {"particle": np.arange(first, first + shape.rows(number))}
+        for name in names:
+            array = run.read(number, name)
+            for place in product(*map(range, array.shape[1:])):
+                words = [WALLS[i] if FIELDS[name].dims[-1] == "wall" else str(i + 1) for i in place]
+                at: Any = (slice(None), *place)
+                columns["_".join([name, *words])] = array[at]
+        yield columns
+
+
+def export_run(run: Path, to: Path) -> None:
+    """Write a finished run as one table.
+
+    Raises:
+        BadInput: a block is damaged, a table has too many columns, or pyarrow is not installed.
+    """
+    check_file(to, (".parquet", ".csv", ".npz"))
+    found = open_run(run)
+    if to.suffix == ".npz":
+        write_file(to, partial(write_npz, found))
+    else:
+        write_file(to, partial(TABLES[to.suffix], _tables(found)))
+    print(to)

@@ -1,24 +1,70 @@
-"""`mushrooms theory`: what the theory predicts for one cycle, as decimal strings, and what each figure is."""
+"""`mushrooms scenes` and `theory`: the catalogue, a scene as a file, what theory predicts for one cycle."""
 
 from __future__ import annotations
 
+import json
 import math
 import sys
-from typing import Annotated, Any
+from typing import Any
 
-import typer
+from rich.table import Table
 
-from conformance.audit.runs import scene_named
-from mushrooms.forecast import expected_collisions
-from mushrooms.terminal import (
-    AsJson,
-    SceneName,
-    print_pairs,
-    progress_bar,
-)
-from scene import Scene
+import scene as scenes
+import theory
+from conformance.audit.runs import SCENES, scene_named
+from mushrooms.output import new_console, print_pairs, progress_bar
+from mushrooms.store.summary import expected_collisions
+from scene import BadInput, Scene
+from scene.load import catalogue_text, read_data
 
-MAX_DIGITS = 1000
+
+def print_scenes(name: str, as_toml: bool, as_json: bool) -> None:
+    """Print the catalogue, or one scene of it or of the audit."""
+    if as_toml and as_json:
+        raise BadInput("--toml and --json: must be one of them")
+    if as_toml and not name:
+        raise BadInput(f"--toml needs NAME, one of {', '.join(scenes.catalogue())}")
+    if name:
+        data = scenes.to_data(SCENES[name]) if name in SCENES else None
+        if as_json:
+            print(json.dumps(data or read_data(name), indent=2, ensure_ascii=False))
+        else:
+            print((_toml(data) if data else catalogue_text(name)).rstrip("\n"))
+        return
+    rows = [_catalogue_row(name) for name in scenes.catalogue()]
+    if as_json:
+        print(json.dumps(rows, indent=2, ensure_ascii=False))
+        return
+    table = Table("name", "table", "period", "notes", title="Catalogue")
+    for row in rows:
+        length = (
+            "refused" if row["refused"] else "static" if row["period"] is None else f"{row['period']:.6g}"
+        )
+        notes = f"Refused: {row['refused']}" if row["refused"] else row["notes"]
+        table.add_row(row["name"], row["table"], length, notes)
+    new_console().print(table)
+
+
+def _toml(data: dict[str, Any]) -> str:
+    """Return a scene as TOML: a line for each field, a law in one of them."""
+
+    def text(value: Any) -> str:
+        if isinstance(value, dict):
+            return "{ " + ", ".join(f"{name} = {text(part)}" for name, part in value.items()) + " }"
+        return json.dumps(value)  # of numbers, lists and plain strings TOML says the same
+
+    return "\n".join(f"{name} = {text(value)}" for name, value in data.items())
+
+
+def _catalogue_row(name: str) -> dict[str, Any]:
+    data = read_data(name)
+    row = {"name": name, "table": data["table"], "period": None, "notes": data.get("notes", "")}
+    try:
+        return row | {"period": scenes.load(name).period or None, "refused": None}
+    except scenes.InvalidScene as error:
+        return row | {"refused": str(error).partition(": ")[2]}
+
+
 # s = log E1/E0 over one cycle.
 FIGURES = {
     "p_nc": "probability of never being captured in a cycle (eq. ps)",
@@ -44,25 +90,8 @@ FIGURES = {
 }
 
 
-def predict(
-    scene: SceneName,
-    digits: Annotated[
-        int, typer.Option(min=1, max=MAX_DIGITS, help=f"Correct digits, 1 to {MAX_DIGITS}.")
-    ] = 15,
-    energy: Annotated[
-        float | None, typer.Option(min=0, help="Also predict for this initial energy v²/2, > 0.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Print the paper's predictions for one cycle as decimal strings.
-
-    With --energy also predict at that energy, with the possible error of the prediction. This needs rates
-    that python -m conformance.audit.frozen measures. They are known for moving-cap, moving-cap-trivial, both
-    fixed caps, ergodic, retraced-arc, the scenes of the audit, and the reverses of all these. For another
-    scene only the limit of high energies is printed, and a line on stderr says why.
-    """
-    import theory
-
+def print_prediction(scene: str, digits: int, energy: float | None, as_json: bool) -> None:
+    """Print what the theory predicts for one cycle, and at an energy if one is given."""
     found = scene_named(scene)
     with progress_bar() as bar:
         task = bar.add_task("resolution 1 of two or more", total=100)
@@ -77,8 +106,6 @@ def predict(
 
 def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
     """Return the figures of one cycle at an initial energy; where there are none, say why on stderr."""
-    import theory
-
     speed, n_collisions = math.sqrt(2 * energy), expected_collisions(scene, energy, 1)
     first: dict[str, float | bool | None] = {
         "energy": energy,

@@ -1,0 +1,218 @@
+"""`mushrooms ask`, `attack` and `verify`: single questions, their proved answers, and answers of steppers.
+
+A question is a case of the test suite, a draw of a family of nasty questions, or a step of a trajectory.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from rich.markup import escape
+from rich.table import Column, Table
+
+import fast
+import reference
+from conformance import vectors
+from conformance import verify as verifier
+from conformance.audit.runs import scene_named
+from conformance.cases.attacks import UnderAttack, run
+from conformance.cases.certify import judge
+from conformance.cases.draw import wire_form
+from conformance.cases.generated import fresh_one
+from conformance.cases.table import FAMILIES
+from conformance.files import write_file
+from conformance.grading.agreement import middle
+from conformance.suite import Result, ask_vector
+from conformance.suite.answers import outcomes_of
+from conformance.suite.process import CheckFailure
+from conformance.suite.run import N_FRESH
+from conformance.suite.session import Session
+from conformance.suite.sheet import read_number, read_rows
+from conformance.suite.symmetry import Transform, draw_transform
+from conformance.vectors import Vector
+from mushrooms.check import format_outcome
+from mushrooms.output import announce_compilation, check_file, new_console, progress_bar
+from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined, from_data
+from scene.refusal import shown
+
+
+def ask_case(case: str, command: list[str] | None, seed: int | None, as_json: bool) -> int:
+    """Print a question with its answer and rule; ask a stepper too, if one is given; return the exit code."""
+    vector = _find(case, seed)
+    transform = Transform() if seed is None else draw_transform(vector, seed)
+    result = _put(command, vector, transform) if command else None
+    if as_json:
+        print(msgspec.json.format(msgspec.json.encode(vector), indent=1).decode())
+    else:
+        _show(vector, transform)
+    if result is None:
+        return 0
+    if result.answer is not None:
+        given = "\n           ".join(map(format_outcome, outcomes_of(result.answer)))
+        print(f"given      {given}")
+    new_console(soft_wrap=True).print(f"[bold]{result.verdict}[/]: {escape(result.why)}")
+    return 0 if result.is_right else 1
+
+
+def _find(case: str, seed: int | None) -> Vector:
+    known = {vector.id: vector for vector in vectors.load("stress")}
+    if case in known:
+        return known[case]
+    fresh = {f"fresh/{number}": number for number in range(1, max(N_FRESH.values()) + 1)}
+    if case not in fresh:
+        raise BadInput(f"ID = {case!r}, must be a vector's, such as {next(iter(known))}")
+    if seed is None:
+        raise BadInput(f"ID = {case!r} is of one run's questions: give the run's --seed")
+    return fresh_one(seed, fresh[case])
+
+
+def _show(vector: Vector, transform: Transform) -> None:
+    console = new_console(soft_wrap=True)
+    condition = f", condition {vector.condition:.3g}" if vector.condition else ""
+    console.print(f"[bold]{vector.id}[/], level {vector.level}{condition}")
+    console.print(f"rule       {escape(vector.rule)}")
+    console.print(f"source     {escape(vector.source)}")
+    if str(transform) != str(type(transform)()):
+        console.print(f"asked      {transform}; certified answers below are of the question as published")
+    console.print(f"question   {escape(json.dumps(vectors.request(transform.apply(vector), 0)))}")
+    for i, expectation in enumerate(vector.expect):
+        console.print(
+            f"{'certified' if i == 0 else 'or'}  {expectation.outcome} {expectation.reason}".rstrip()
+        )
+        for number, outcome in enumerate(middle(expectation, vector.state), 1):
+            console.print(f"  {number:>4}  {escape(format_outcome(msgspec.to_builtins(outcome)))}")
+        for begin, end in expectation.stays:
+            console.print(f"  captured from step {begin + 1} to step {end + 1}")
+    verdict = judge(vector)
+    console.print(f"verifier   {verdict.status} {escape(verdict.reason)}".rstrip())
+
+
+def _put(command: list[str], vector: Vector, transform: Transform) -> Result:
+    with Session(command) as session:
+        try:
+            session.start()
+            session.probe()
+        except CheckFailure as failure:
+            raise BadInput(f"the command does not speak protocol 1: {failure}") from None
+        return ask_vector(session, vector, transform)
+
+
+CHOICES = ("reference", "fast", "both")
+SLOWEST = 10.0  # seconds that one question may take the reference: its work is bounded
+
+
+def attack_steppers(family: str, cases: int, seed: int, stepper: str, json_file: Path | None) -> int:
+    """Ask steppers the questions of one family or of all, print the counts, and return the exit code."""
+    if stepper not in CHOICES:
+        raise BadInput(f"--stepper = {stepper!r}, must be one of {', '.join(CHOICES)}")
+    names = list(FAMILIES) if family == "all" else [family]
+    if family != "all" and family not in FAMILIES:
+        raise BadInput(f"--family = {family!r}, must be all or one of {', '.join(FAMILIES)}")
+    check_file(json_file, (".json",))
+    with announce_compilation(), progress_bar() as bar:
+        task = bar.add_task("attack", total=cases * len(names))
+        tallies = run(
+            [FAMILIES[name] for name in names],
+            cases,
+            seed,
+            steppers(stepper),
+            progress=lambda _: bar.advance(task),
+        )
+    _print(tallies)
+    if json_file is not None:
+        write_file(json_file, json.dumps([_row(tally) for tally in tallies], indent=1) + "\n")
+    return int(any(tally.cases["wrong"] or tally.slowest > SLOWEST for tally in tallies))
+
+
+def steppers(choice: str) -> UnderAttack:
+    """Return what "reference", "fast" or "both" puts under attack."""
+    if choice == "reference":
+        return UnderAttack()
+    return UnderAttack(fast.next_collision, count_hits, is_proved=choice == "both")
+
+
+def count_hits(scene: Scene, state: State, t_end: float) -> dict[str, int] | None:
+    """Return how often the lanes meet each wall up to t_end; None where a flow is undecided or refused."""
+    try:
+        carried = fast.flow(scene, [state], t_end)
+    except BadInput:
+        return None
+    if not isinstance(carried.outcomes[0], Horizon | Undefined):
+        return None
+    return dict(zip(Mushroom.walls, map(int, carried.wall_counts[0]), strict=True))
+
+
+def _row(tally: Any) -> dict[str, Any]:
+    row = {"family": tally.family, "cases": tally.n_cases, **tally.counts}
+    row |= {"worst_ulps": tally.worst_ulps, "slowest_s": tally.slowest}
+    return row | {f"{kind}_cases": cases for kind, cases in tally.cases.items()}
+
+
+def _print(tallies: list[Any]) -> None:
+    heads = ("cases", "agreed", "undecided", "refused", "open", "wrong", "worst ulps", "slowest s")
+    # The name is needed to ask again: a narrow terminal cuts the heads instead.
+    table = Table(Column("family", no_wrap=True), *heads, title="Attacks: verdicts of all steppers asked")
+    for tally in tallies:
+        counts = [str(count) for count in tally.counts.values()]
+        table.add_row(
+            tally.family, str(tally.n_cases), *counts, f"{tally.worst_ulps:.3g}", f"{tally.slowest:.2f}"
+        )
+    new_console().print(table)
+    for tally in tallies:
+        for kind in ("open", "wrong"):
+            for case in tally.cases[kind]:
+                print(f"{kind}: {case}")
+
+
+FIELDS = ("t", "x", "y", "vx", "vy")
+
+
+def verify_file(file: Path, scene: str | None, picture: Path | None) -> int:
+    """Judge each step of a trajectory from the state before it, and return the exit code."""
+    check_file(picture, (".svg",))
+    label = f"trajectory {str(file)!r}"
+    if (file.suffix == ".csv") != (scene is not None):
+        raise BadInput(f"{label}: a CSV file needs --scene, a JSON file has its own")
+    try:
+        text = file.read_text("utf-8") if scene is None else json.dumps(_of_rows(file, label, scene))
+        verdicts = list(verifier.verify_answers(text))
+    except BadInput:
+        raise
+    except (verifier.Refused, verifier.Unproved, ValueError, RecursionError) as error:
+        raise BadInput(f"{label}: {error}") from None
+    for place, verdict in verdicts:
+        print(f"{place}: {verdict.status}: {verdict.reason}")
+    n_proved = sum(verdict.status == "proved" for _, verdict in verdicts)
+    print(f"{n_proved} of {len(verdicts)} proved")
+    wrong = next((i for i, (_, verdict) in enumerate(verdicts) if verdict.status == "false"), None)
+    if picture is not None and wrong is not None:
+        write_file(picture, _draw(json.loads(text), wrong))
+        print(f"Picture of step {wrong + 1}: {picture}")
+    return int(n_proved < len(verdicts))
+
+
+def _of_rows(file: Path, label: str, scene: str) -> dict[str, Any]:
+    """Return a CSV file as the verifier takes a trajectory."""
+    states = []
+    for place, row in read_rows(file, label, FIELDS):
+        numbers = {name: read_number(place, name, row[name]) for name in FIELDS}
+        states.append({**numbers, "wall": row.get("wall") or None})
+    if not states:
+        raise BadInput(f"{label}: there is no row")
+    return {"scene": wire_form(scene_named(scene)), "state": states[0], "steps": states[1:]}
+
+
+def _draw(data: dict[str, Any], at: int) -> bytes:
+    """Draw a step as it was given, and as the reference has it."""
+    from mushrooms.reports import check_page  # drawing takes a second to import
+
+    begin = data["steps"][at - 1] if at else data["state"]
+    state = msgspec.convert({name: begin.get(name) for name in (*FIELDS, "wall")}, State)
+    given, scene = data["steps"][at], from_data(data["scene"])
+    found = reference.next_collision(scene, state, float(data.get("t_end", 1e300)))
+    if not isinstance(found, reference.Collision | reference.Horizon):
+        raise BadInput(f"--picture: step {at + 1} from {shown(str(state))} has no certified end to draw")
+    return check_page.draw_step(scene, state, found.rounded(), given)

@@ -61,6 +61,11 @@ class Round(LaneRound):
         self.kernels = kernels
         self.is_cap, self.is_disk = self.is_disk, self.is_disk or is_captured
 
+    def fill_all(self, starts: list[Start], age: float = 0.0) -> None:
+        """Put starts into the first lanes, their laws known from `age` before them."""
+        for lane, (p, wall) in enumerate(starts):
+            self.fill(lane, p, wall, age)
+
     def advance(self, n: int) -> None:
         """Take a step in n lanes; faulty kernels run uncompiled, on a list."""
         if self.is_disk:
@@ -202,8 +207,7 @@ def try_starts(
     """Fill a pool with starts in a scene and take lane steps from them."""
     found = []
     age = pool.serves * random.random() if pool.serves < np.inf and random.random() < 0.5 else 0.0
-    for lane, start in enumerate(starts):
-        pool.fill(lane, *start, age)
+    pool.fill_all(starts, age)
     is_live = np.array([is_valid(pool, *start) for start in starts], dtype=bool)
     for _ in range(N_ROUNDS):
         begun = [state_in(pool, i) for i in range(len(starts))]

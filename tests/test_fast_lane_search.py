@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 from support.depth import deep_among
 from support.faulty_kernels import faulty_lanes
+from support.lane_anywhere import draw_anywhere
 from support.lane_corners import CORNERS
-from support.lane_draws import GROUPS, draw_starts
-from support.lane_draws import draw_scene as draw_directed_scene
-from support.lane_search import ANYWHERE, Round, draw_scene, draw_start, search
-from support.lane_traps import TRAPS
+from support.lane_search import ANYWHERE, GROUPS, Round, search
 
 import fast
 import reference
@@ -27,7 +25,7 @@ from scene import Cap, Collision, Mushroom, Rejected, State
 N_ANSWERS = int(os.environ.get("MUSHROOMS_LANE_ANSWERS", "150"))  # of each group of draws
 
 
-@pytest.mark.parametrize("group", deep_among([ANYWHERE, *GROUPS, *TRAPS], "misled chord", "misled side"))
+@pytest.mark.parametrize("group", deep_among(GROUPS, "misled chord", "misled side"))
 def test_no_lane_answer_is_wrong(group, tally):
     assert search(11, N_ANSWERS, tally, group) == []
 
@@ -35,8 +33,7 @@ def test_no_lane_answer_is_wrong(group, tally):
 def test_lanes_alone_take_the_careful_steps_and_no_free_starts(tally):
     random = np.random.default_rng(8)
     for _ in range(12):
-        scene = draw_scene(random)
-        starts = [draw_start(scene, random) for _ in range(24)]
+        scene, starts = draw_anywhere(24, random)
         rows = [(tuple(float(v) for v in np.delete(p, 1)), wall) for p, wall in starts]
         on_walls = [State(*row, WALL_NAMES[wall]) for row, wall in rows]
         free = [State(*row) for row, _ in rows]
@@ -221,8 +218,7 @@ def test_uncompiled_lanes_give_the_bits_of_compiled_ones(group):
     """Mutants run uncompiled; what is not spoilt in them is what users run."""
     random, aim = np.random.default_rng(7), GROUPS[group]
     for _ in range(4):
-        scene = draw_directed_scene(aim, random)
-        starts = draw_starts(scene, aim, pools.LANES, random)
+        scene, starts = aim.draw(pools.LANES, random)
         one, other = (Round(scene, k, is_captured=aim.is_captured) for k in (lanes, faulty_lanes("", "")))
         one.fill_all(starts)
         other.fill_all(starts)

@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 from msgspec.structs import replace
-from support.lane_search import draw_scene
+from support.lane_anywhere import draw_scene
 
 import fast
 from fast import ensemble, pieces

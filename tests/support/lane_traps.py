@@ -26,7 +26,7 @@ N_CROWD = 4_000
 REACH = 0.24  # phase
 
 
-class Trap(NamedTuple):
+class Group(NamedTuple):
     """How to draw a scene and starts, and whether particles move unfolded through the base."""
 
     draw: Callable[[int, np.random.Generator], tuple[Scene, list[Start]]]
@@ -159,12 +159,12 @@ def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]
     return scene, starts
 
 
-TRAPS = {
-    "corner over a rising floor": Trap(corner_over_a_rising_floor),
-    "misled chord": Trap(misled_chord, is_captured=True),
-    "misled side": Trap(misled_side),
-    "early hop": Trap(early_hop),
-    "early hop through the base": Trap(early_hop, is_captured=True),
-    "up a deep stem": Trap(up_a_deep_stem),
-    "slow beside a plateau": Trap(slow_beside_a_plateau),
+TRAPS: dict[str, Group] = {
+    "corner over a rising floor": Group(corner_over_a_rising_floor),
+    "misled chord": Group(misled_chord, is_captured=True),
+    "misled side": Group(misled_side),
+    "early hop": Group(early_hop),
+    "early hop through the base": Group(early_hop, is_captured=True),
+    "up a deep stem": Group(up_a_deep_stem),
+    "slow beside a plateau": Group(slow_beside_a_plateau),
 }

@@ -17,7 +17,7 @@ from fast.step import WALL_NAMES
 from scene import Collision, Horizon, Rejected, Scene, State
 from scene.refusal import BadInput
 from scene.transforms import frozen, scaled, scaled_state
-from support.lane_search import draw_scene, draw_start
+from support.lane_anywhere import draw_scene, draw_start
 
 MOST = 390
 Numbers = tuple[object, ...]  # what does not scale, then dt, t, x, y, vx, vy in rows

@@ -9,7 +9,6 @@ import sys
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import fast
 from conformance.strategies import scenes_and_states
@@ -91,17 +90,6 @@ def test_a_mirrored_trajectory_is_the_mirror_of_the_trajectory(drawn):
     other = fast.trajectory(scene, mirrored(s), 30)
     assert other.walls == [mirrored_wall(wall) for wall in one.walls]
     assert np.array_equal(other.steps, one.steps * [1, 1, -1, 1, -1, 1])
-
-
-@settings(max_examples=60)
-@given(scenes_and_states(), st.integers(-20, 20), st.integers(-20, 20))
-def test_a_scaled_trajectory_is_the_scaled_one(drawn, length, time):
-    scene, s, _ = drawn
-    one = fast.trajectory(scene, s, 30)
-    other = fast.trajectory(scaled(scene, length, time), scaled_state(s, length, time), 30)
-    speed = length - time
-    assert other.walls == one.walls
-    assert np.array_equal(other.steps, np.ldexp(one.steps, [time, time, length, length, speed, speed]))
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-clockwise", "breathing-circle"])

@@ -6,13 +6,11 @@ but a hop keeps what distance from the arc a start was given, and a flight that 
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 import pytest
 from support.depth import deep_but
-from support.faulty_kernels import output_of
 
 import fast
 from scene import Cap, Collision, Fourier, Horizon, Mushroom, State, Stem
@@ -26,16 +24,6 @@ SCENES = {
     "a stem": Stem(w=1.0, h=Fourier(1.0, 2.0, cos=(0.01,)), slope=0.1),
 }
 FARTHEST = 2.0**-21  # of a wall's size: half of what the protocol allows
-PROGRAM = """
-import json
-from test_fast_given_starts import differences
-print(json.dumps([*differences("a cap", "arc", 16), *differences("a cap", "base", 60)]))
-"""
-SHARE = """
-import json
-from test_fast_given_starts import share_of_careful_steps
-print(json.dumps(share_of_careful_steps("a mushroom", 15, 60.0)))
-"""
 
 
 def drawn(random, scene, wall):
@@ -112,21 +100,3 @@ def share_of_careful_steps(name, n, flights):
 @pytest.mark.parametrize("name", ["a cap", "a mushroom"])
 def test_the_lanes_know_who_has_left_the_arc_since(name):
     assert share_of_careful_steps(name, 60, math.inf) < 0.05
-
-
-def test_without_it_they_do_not(tmp_path):
-    changed = "follow.py", "a[AS_GIVEN + i] = 0.0", "a[AS_GIVEN + i] = 1.0"
-    assert json.loads(output_of(tmp_path, SHARE, *changed)) > 0.4
-
-
-CHANGES = [
-    ("follow.py", "and a[AS_GIVEN + i] == 0.0", "and a[AS_GIVEN + i] < 2.0"),
-    ("pools.py", "if a[Y + i] < 0.0 and a[WALL + i] == ON_ARC:", "if a[Y + i] < 0.0:"),
-    ("follow.py", "if pool == DISK and a[WALL + i] == ON_ARC:", "if pool == DISK:"),
-]
-
-
-@pytest.mark.parametrize("change", deep_but(CHANGES, CHANGES[0]))
-def test_without_it_some_end_elsewhere(tmp_path, change):
-    found = json.loads(output_of(tmp_path, PROGRAM, *change))
-    assert any(off > 1e-10 or hits for off, hits in found)

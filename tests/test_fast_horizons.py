@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.faulty_kernels import output_of
 
 import fast
 from fast import __main__ as served
@@ -27,11 +26,6 @@ MISSED = State(
     -0.15007099796621198,
     "right",
 )
-PROGRAM = """
-from test_fast_horizons import MISSED, WAVING
-import fast
-print(fast.next_collision(WAVING, MISSED, 50.0).wall)
-"""
 
 
 def slow_starts(random, n):
@@ -56,15 +50,6 @@ def test_a_step_does_not_depend_on_how_far_it_may_look(scene):
 
 def test_the_floor_is_not_missed():
     assert fast.next_collision(WAVING, MISSED, 50.0) == fast.next_collision(WAVING, MISSED, 25.0)
-
-
-def test_a_stepper_that_looks_for_sides_below_the_floor_misses_it(tmp_path):
-    order = "for candidate in (FLOOR, LEFT, RIGHT):"
-    assert output_of(tmp_path / "honest", PROGRAM).strip() == "floor"
-    faulty = output_of(
-        tmp_path / "faulty", PROGRAM, "scalar_step.py", order, "for candidate in (LEFT, RIGHT, FLOOR):"
-    )
-    assert faulty.strip() == "left"
 
 
 SWEPT = Stem(w=0.5, h=Fourier(1.0, 1.0, (0.2,)))

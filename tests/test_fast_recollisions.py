@@ -8,7 +8,6 @@ import random
 
 import pytest
 from support.answers_by_hand import ON_TWO_WALLS, UNDEFINED
-from support.faulty_kernels import output_of
 from support.recollisions import recollisions
 from support.tables import BOX, LIFT
 from support.truth import proved_step
@@ -32,11 +31,17 @@ def again(seed, n, t_ahead=5.0):
             return
 
 
-def test_recollisions_are_right_to_four_backward_ulps(tally):
-    for scene, state, found in again(1, N_RECOLLISIONS):
-        agreement = compare(found, proved_step(scene, state, state.t + 5.0), state, 4.0)
-        tally["recollisions"] += 1
-        assert agreement.kind == "agrees", (agreement, scene, state)
+def wrong_recollisions(n):
+    """Return those of n recollisions that are off by more than four backward ulps."""
+    return [
+        (str(scene), str(state))
+        for scene, state, found in again(1, n)
+        if compare(found, proved_step(scene, state, state.t + 5.0), state, 4.0).kind != "agrees"
+    ]
+
+
+def test_recollisions_are_right_to_four_backward_ulps():
+    assert wrong_recollisions(N_RECOLLISIONS) == []
 
 
 # Found by search: 4.2 to 8.8 backward ulps when x vx + y vy was taken to be as wrong as its terms.
@@ -83,24 +88,6 @@ def test_recollisions_from_off_the_arc_are_right_to_four_backward_ulps(tally):
         tally[type(found).__name__] += 1
         assert agreement.kind == "agrees", (agreement, scene, state)
     assert tally["Collision"] > 4 * N_RECOLLISIONS
-
-
-PROGRAM = """
-from test_fast_recollisions import again
-for scene, state, found in again(1, 60):
-    print(found.vx.hex(), found.vy.hex())
-"""
-
-
-def test_without_the_rest_of_a_hop_speeds_are_wrong(tmp_path):
-    """A mutant: the time of the hit to its own last bit only."""
-    old = "s_low, rest = rest_of_hop(s, f, slope_s, particle, scene, anchors), 0.0"
-    new = "s_low, rest = 0.0, 0.0"
-    honest = [v for _, _, found in again(1, 60) for v in (found.vx, found.vy)]
-    printed = output_of(tmp_path, PROGRAM, "scalar_step.py", old, new)
-    spoilt = [float.fromhex(word) for word in printed.split()]
-    off = [abs(a - b) / abs(a or 1.0) for a, b in zip(honest, spoilt, strict=True)]
-    assert max(off) > 1e-9
 
 
 def test_a_floor_met_again_across_a_knot_keeps_its_speed():

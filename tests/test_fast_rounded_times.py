@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
-from support.depth import deep_but
-from support.faulty_kernels import output_of
 from support.rounded_times import FAMILIES, questions
 
 import fast
@@ -49,39 +45,3 @@ def test_what_is_decided_is_right(family, tally):
     tally["decided"], tally["wrong"] = wrong(family, answers(family))
     assert tally["decided"] > 0
     assert tally["wrong"] == 0
-
-
-# What is taken out of the kernels, and the family that misses it.
-MUTANTS = {
-    "a wall that has come back": (
-        "after a spike",
-        "scalar_step.py",
-        "if side > 0 and s < limit:",
-        "if s < 0.0:",
-    ),
-    "the mouth's own motion": (
-        "beside a moving mouth",
-        "walls.py",
-        "rounding * (abs(vx) + drift)",
-        "rounding * abs(vx)",
-    ),
-    "what is wrong with f' on the way": (
-        "along a leaning side",
-        "scalar_step.py",
-        "(error + slope_error * h) / -slope",
-        "error / -slope",
-    ),
-}
-PROGRAM = """
-import json
-from test_fast_rounded_times import answers
-print(json.dumps(answers({family!r})))
-"""
-
-
-@pytest.mark.parametrize("name", deep_but(MUTANTS, "the mouth's own motion"))
-def test_a_stepper_without_it_is_wrong(name, tmp_path, tally):
-    family, *change = MUTANTS[name]
-    found = json.loads(output_of(tmp_path, PROGRAM.format(family=family), *change))
-    tally["decided"], tally["wrong"] = wrong(family, found)
-    assert tally["wrong"] > 0

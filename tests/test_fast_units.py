@@ -178,28 +178,6 @@ def test_what_is_rounded_up_to_the_least_normal_number_is_refused(exponent):
         outward(rounded, np.array(exponent))
 
 
-@pytest.mark.parametrize("exponent", [-900, -950])
-def test_a_path_loses_no_bit_that_one_question_keeps(exponent, tally):
-    """Products bring the first table's steps back, and ldexp the second's: their units are beyond 2^-1000."""
-    random = np.random.default_rng(4)
-    for _ in range(60):
-        angle, shrink = float(random.uniform(0.1, 3.0)), int(random.integers(20, 1065 + exponent))
-        along, across = np.ldexp([math.cos(angle), math.sin(angle)], [exponent, exponent - shrink])
-        state = State(0.0, 0.0, math.ldexp(0.5, exponent - shrink), float(along), float(across))
-        cap = Cap(r=2.0**exponent)
-        alone = fast.next_collision(cap, state, 1e300)
-        found = fast.trajectory(cap, state, 1)
-        if isinstance(alone, Undecided):
-            assert "beyond binary64" in alone.reason
-            assert found.outcome == alone
-        else:
-            assert found.walls == [alone.wall]
-            assert found.steps[0].tolist() == [alone.dt, alone.t, alone.x, alone.y, alone.vx, alone.vy]
-        tally[alone.__class__.__name__] += 1
-    assert tally["Collision"] > 5
-    assert tally["Undecided"] > 5
-
-
 @pytest.mark.parametrize(("speed", "is_kept"), [(-20, True), (-26, False), (-30, False)])
 def test_a_path_that_overflows_is_undecided(speed, is_kept):
     """Of so large a table: dt = 2^(1000 - speed) is beyond the largest float from 2^1024 on."""

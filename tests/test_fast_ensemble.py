@@ -8,15 +8,7 @@ from scipy import stats
 
 import fast
 from fast.starts import cycle_stops, initial_states
-from scene import BadInput, State, load
-
-
-def test_more_particles_keep_the_first_ones():
-    few = fast.simulate(load("fixed-cap-clockwise"), n_particles=20, energy=1e4, seed=1)
-    many = fast.simulate(load("fixed-cap-clockwise"), n_particles=90, energy=1e4, seed=1)
-    assert np.array_equal(few.cycle_energies, many.cycle_energies[:20])
-    other = fast.simulate(load("fixed-cap-clockwise"), n_particles=20, energy=1e4, seed=2)
-    assert not np.array_equal(few.energy, other.energy)
+from scene import BadInput, Fourier, Mushroom, State, load
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "breathing-circle", "fermi-ulam"])
@@ -39,14 +31,10 @@ def test_blocks_are_parts_of_the_whole():
         part = fast.simulate(load("moving-cap"), n_particles=n, energy=1e3, n_cycles=2, seed=4, first=first)
         for got, wanted in zip(part[1:-2], whole[1:-2], strict=True):
             assert np.array_equal(got, wanted[first : first + n], equal_nan=True)
+    other = fast.simulate(load("moving-cap"), n_particles=90, energy=1e3, n_cycles=2, seed=5)
+    assert not np.array_equal(other.energy, whole.energy)
     with pytest.raises(BadInput, match="first = -1, must be 0 to"):
         fast.simulate(load("moving-cap"), n_particles=1, energy=1e3, first=-1)
-
-
-def test_cycles_continue_one_another():
-    one = fast.simulate(load("moving-cap"), n_particles=30, energy=1e3, n_cycles=1)
-    three = fast.simulate(load("moving-cap"), n_particles=30, energy=1e3, n_cycles=3)
-    assert np.array_equal(one.cycle_energies[:, 0], three.cycle_energies[:, 0])
 
 
 def test_each_cycle_has_its_means_and_their_errors():
@@ -96,12 +84,24 @@ def test_frozen_table_keeps_energy_and_island():
     assert captured == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 4000))
 
 
-def test_least_nu_is_found():
-    stops = cycle_stops(load("moving-cap"), 2, (0.25,))
-    assert stops.times == pytest.approx(np.array([1, 2, 4, 5, 6, 8]) * np.pi / 2)
+@pytest.mark.parametrize(
+    ("name", "phase", "times"),
+    [
+        ("moving-cap", 0.25, [0.25, 0.5, 1, 1.25, 1.5, 2]),
+        ("narrowest at the end", 0.5, [0.5, 1, 1, 1.5, 2, 2]),  # before the end of its cycle
+    ],
+)
+def test_least_nu_is_found(name, phase, times):
+    at_the_end = Mushroom(r=1.0, h=1.0, nu=Fourier(mean=0.6, omega=1.0, cos=(-0.3,)))
+    stops = cycle_stops(load(name) if name == "moving-cap" else at_the_end, 2, (phase,))
+    assert stops.times == pytest.approx(np.array(times) * 2 * np.pi)
     assert stops.columns.tolist() == [0, -1, 1, 2, -1, 3]
     assert stops.cycles.tolist() == [-1, -1, 0, -1, -1, 1]
-    assert stops.mouth_minima == pytest.approx(np.array([[np.pi], [3 * np.pi]]), rel=1e-15)
+
+
+def test_mouth_minima_are_times():
+    minima = cycle_stops(load("moving-cap"), 2, (0.25,)).mouth_minima
+    assert minima == pytest.approx(np.array([[np.pi], [3 * np.pi]]), rel=1e-15)
     assert cycle_stops(load("fixed-cap-anticlockwise"), 1, ()).mouth_minima.tolist() == [[0.375]]
 
 

@@ -15,7 +15,7 @@ from support.depth import deep_but
 import fast
 import theory
 from fast import starts
-from fast.starts import cycle_stops, initial_states, one_cycle
+from fast.starts import initial_states, one_cycle
 from scene import BangBang, Fourier, Mushroom, State, load
 from scene.laws import value
 from scene.mouth import mouth_minima, start_time
@@ -128,13 +128,6 @@ def test_a_narrowing_at_the_cycle_s_end_belongs_to_it():
         assert np.all(run.t_out[captured, cycle, 0] == span * (cycle + 1.0))
     stays = run.t_in[run.takes_part() & run.is_captured()[:, 1], 1, 0]
     assert np.mean(stays > span) > 0.99
-
-
-def test_a_narrowing_comes_before_the_end_of_its_cycle():
-    stops = cycle_stops(AT_THE_END, 2, (0.5,))
-    assert stops.columns.tolist() == [0, -1, 1, 2, -1, 3]
-    assert stops.cycles.tolist() == [-1, -1, 0, -1, -1, 1]
-    assert stops.times == pytest.approx(np.array([0.5, 1, 1, 1.5, 2, 2]) * 2 * np.pi)
 
 
 def test_a_mouth_that_stands_still_captures_nobody():

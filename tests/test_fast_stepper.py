@@ -14,7 +14,6 @@ from support.truth import proved_step
 import fast
 import reference
 from conformance.grading.agreement import compare
-from fast.batch import lane_steps
 from fast.kernel import arithmetic
 from fast.kernel.laws import increment, set_anchors
 from fast.kernel.records import ANCHORS_SHAPE, DEPTH, VALUE
@@ -152,13 +151,6 @@ def test_an_arc_that_dips_below_zero_and_comes_back_on_the_way_to_the_base():
     walls = [step.wall for step in truth.steps]
     assert walls == fast.trajectory(scene, state, 9, t_end).walls == ["arc", "arc", "base"]
     assert fast.flow(scene, [state], t_end).wall_counts.tolist() == [[2, 1, 0, 0, 0]]
-
-
-@pytest.mark.parametrize("state", [State(0.0, 0.1, -0.3, 1.0, 2.0), State(0.0, 0.1, 0.3, 1.0, -2.0)])
-def test_lanes_with_a_start_that_names_no_wall(state):
-    (found,) = lane_steps(STATIC, [state])
-    truth = fast.next_collision(STATIC, state, 9.0)
-    assert found is None or found.wall == truth.wall
 
 
 def test_python_may_call_a_kernel():

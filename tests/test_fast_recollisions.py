@@ -8,34 +8,68 @@ import random
 
 import pytest
 from support.answers_by_hand import ON_TWO_WALLS, UNDEFINED
-from support.recollisions import recollisions
 from support.tables import BOX, LIFT
 from support.truth import proved_step
 
 import fast
 import reference
+from conformance.cases.draw import Draw
+from conformance.cases.scenes import Clock
+from conformance.cases.scenes import scene as drawn_scene
+from conformance.cases.scenes import state as drawn_state
 from conformance.grading.agreement import compare
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, Stem, Undecided, Undefined
 
 N_RECOLLISIONS = int(os.environ.get("MUSHROOMS_RECOLLISIONS", "25"))
 
 
-def again(seed, n, t_ahead=5.0):
-    """Yield the first n recollisions: scene, state and answer."""
-    for scene, state in recollisions(seed, 20 * n):
-        found = fast.next_collision(scene, state, state.t + t_ahead)
-        if isinstance(found, Collision) and found.wall == state.wall:
-            yield scene, state, found
-            n -= 1
-        if n == 0:
-            return
+def plateaus(draw, low, high, shared):
+    """Draw a law of legs some of which stand still; now and then a constant."""
+    if draw.pick(range(3)) == 0:
+        return draw.between(low, high)
+    n, first, values = draw.pick((2, 3, 4)), draw.pick((0.0, 0.3125, -0.75)), [draw.between(low, high)]
+    times = [first, *sorted(first + shared.rate * draw.between(0.02, 0.98) for _ in range(n))]
+    for _ in range(n - 1):
+        values.append(draw.pick((values[-1], draw.between(low, high))))
+    legs = zip([*times, first + shared.rate], [values[-1], *values, values[-1]], strict=True)
+    return BangBang(knots=tuple(legs))
+
+
+def again(n):
+    """Yield n recollisions: scene, state and answer.
+
+    Each start is on a wall that is met again just after a knot of its law, or while it turns: the wall has
+    been at rest, or has moved with the particle, until nearly the hit. Its speed there is a multiple of the
+    time since, which must be right relative to itself.
+    """
+    n_found, index = 0, 0
+    while n_found < n:
+        draw = Draw(f"recollision/{index}")
+        index += 1
+        scene = drawn_scene(
+            draw,
+            draw.pick(("stem", "mushroom", "mushroom")),
+            Clock("bang-bang", draw.pick((0.5, 1.0, 3.5))),
+            plateaus,
+        )
+        if scene.period is None:
+            continue
+        wall = draw.pick([wall for wall in scene.walls if wall != "base"])
+        t = scene.period * (draw.pick(range(-3, 200)) + draw.part())
+        away, along = draw.power(-60, 0), draw.power(-60, -3)
+        leaving = {"t": t, "site": wall, "speed": along, "lift": away / along}
+        start, _ = drawn_state(draw, scene, leaving)
+        found = fast.next_collision(scene, start, t + 5.0)
+        if isinstance(found, Collision) and found.wall == wall:
+            n_found += 1
+            yield scene, start, found
 
 
 def wrong_recollisions(n):
     """Return those of n recollisions that are off by more than four backward ulps."""
     return [
         (str(scene), str(state))
-        for scene, state, found in again(1, n)
+        for scene, state, found in again(n)
         if compare(found, proved_step(scene, state, state.t + 5.0), state, 4.0).kind != "agrees"
     ]
 

@@ -44,17 +44,17 @@ FAULTS = {
     ),
     "a wall that has come back": (
         "test_fast_rounded_times",
-        "wrong('after a spike', answers('after a spike'))[1] > 0",
+        "judge('after a spike')[1] > 0",
         *("scalar_step.py", "if side > 0 and s < limit:", "if s < 0.0:"),
     ),
     "the mouth's own motion": (
         "test_fast_rounded_times",
-        "wrong('beside a moving mouth', answers('beside a moving mouth'))[1] > 0",
+        "judge('beside a moving mouth')[1] > 0",
         *("walls.py", "rounding * (abs(vx) + drift)", "rounding * abs(vx)"),
     ),
     "what is wrong with f' on the way": (
         "test_fast_rounded_times",
-        "wrong('along a leaning side', answers('along a leaning side'))[1] > 0",
+        "judge('along a leaning side')[1] > 0",
         *("scalar_step.py", "(error + slope_error * h) / -slope", "error / -slope"),
     ),
     # Few questions: with rough phases some take minutes.

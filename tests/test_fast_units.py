@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from msgspec.structs import replace
 from support.truth import proved_step
 
 import fast
@@ -158,12 +157,6 @@ def test_fourier_laws_given_by_their_period_share_a_scene_with_knots(tally):
         tally[found.kind] += 1
         assert found.kind in ("agrees", "undecided")
     assert tally["agrees"] > 8
-
-
-def test_lanes_take_scenes_of_both_kinds_of_laws():
-    scene = replace(MIXED, nu=Fourier(0.5, sin=(0.2,), period=1.0))
-    run = fast.simulate(scene, n_particles=20, energy=1e5, seed=1)
-    assert run.n_careful.sum() < 0.05 * run.n_collisions.sum()
 
 
 @pytest.mark.parametrize("exponent", [-1, -1001])

@@ -95,22 +95,6 @@ def test_a_product_of_two_lows_below_0_is_no_low():
     assert (met.wall, met.dt) == ("left", pytest.approx(0.032594, rel=1e-4))
 
 
-DEEP_SIZE = Fourier(1.0, omega=1.0, cos=(0.9, 0.0, -0.25))
-DEEP_SCENES = {
-    "mouth": Mushroom(r=1.0, h=1.0, nu=Fourier(0.5, omega=1.0, cos=(0.4, 0.0, -0.125))),
-    "cap": Cap(r=Fourier(1.0, omega=1.0, cos=(0.8, 0.0, -0.2))),
-    "deeper cap": Cap(r=Fourier(1.0, omega=1.0, cos=(0.8, 0.0, -0.25))),
-    "stem": Stem(w=DEEP_SIZE, h=DEEP_SIZE),
-}
-
-
-@pytest.mark.parametrize("name", DEEP_SCENES)
-def test_the_lanes_take_deep_waves(name):
-    ensemble = fast.simulate(DEEP_SCENES[name], n_particles=100, energy=1e4, seed=1)
-    assert (ensemble.outcome == 0).all()
-    assert ensemble.n_careful.sum() < 0.05 * ensemble.n_collisions.sum()
-
-
 def test_who_is_inside_a_mouth_of_1e_13_is_let_through_it():
     w = Fourier(mean=0.5000000000001, cos=(-0.38242109364224425,), sin=(-0.3221088436188455,), period=1.0)
     scene, t = Mushroom(r=1.5, w=w, h=1.0), 0.11140847644675131

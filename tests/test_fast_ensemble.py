@@ -26,15 +26,18 @@ def test_particles_start_alike_in_every_block(name):
 
 
 def test_blocks_are_parts_of_the_whole():
-    whole = fast.simulate(load("moving-cap"), n_particles=90, energy=1e3, n_cycles=2, seed=4)
+    """Also in what they would go on from."""
+    scene, asked = load("moving-cap"), {"energy": 300.0, "n_cycles": 2, "seed": 4}
+    whole = fast.go_on(scene, n_particles=90, **asked)
     for first, n in ((0, 1), (1, 88), (37, 53)):
-        part = fast.simulate(load("moving-cap"), n_particles=n, energy=1e3, n_cycles=2, seed=4, first=first)
-        for got, wanted in zip(part[1:-2], whole[1:-2], strict=True):
+        part = fast.go_on(scene, n_particles=n, first=first, **asked)
+        ones, others = ((*run.ensemble[1:-2], run.lanes) for run in (part, whole))
+        for got, wanted in zip(ones, others, strict=True):
             assert np.array_equal(got, wanted[first : first + n], equal_nan=True)
-    other = fast.simulate(load("moving-cap"), n_particles=90, energy=1e3, n_cycles=2, seed=5)
-    assert not np.array_equal(other.energy, whole.energy)
+    other = fast.go_on(scene, n_particles=90, **asked | {"seed": 5})
+    assert not np.array_equal(other.ensemble.energy, whole.ensemble.energy)
     with pytest.raises(BadInput, match="first = -1, must be 0 to"):
-        fast.simulate(load("moving-cap"), n_particles=1, energy=1e3, first=-1)
+        fast.simulate(scene, n_particles=1, energy=1e3, first=-1)
 
 
 def test_each_cycle_has_its_means_and_their_errors():

@@ -91,15 +91,12 @@ def test_deep_quick_and_mixed_laws_too(scene):
     assert (worst_errors(scene, np.random.default_rng(1), 40) <= ROUNDING).all()
 
 
+@pytest.mark.usefixtures("uncached")
 @pytest.mark.parametrize("scene", DEEP[:4])
 def test_pieces_that_hold_for_too_long_are_seen(scene, monkeypatch):
     reach = pieces.reach
     monkeypatch.setattr(pieces, "reach", lambda compiled, degree: 2.0 * reach(compiled, degree))
-    laws_in_lanes.cache_clear()
-    try:
-        assert not (worst_errors(scene, np.random.default_rng(1), 40) <= ROUNDING).all()
-    finally:
-        laws_in_lanes.cache_clear()
+    assert not (worst_errors(scene, np.random.default_rng(1), 40) <= ROUNDING).all()
 
 
 def test_every_flight_that_begins_in_a_piece_has_room_there():
@@ -128,14 +125,11 @@ def test_lanes_know_no_phase_that_the_careful_step_calls_lost():
         assert 2.0**20 < omega * laws_in_lanes(scene).pieces.until < math.pi / 2 * 2.0**27 / n
 
 
+@pytest.mark.usefixtures("uncached")
 def test_laws_that_take_too_many_pieces_are_left_to_careful_steps(monkeypatch):
     monkeypatch.setattr(pieces, "MAX_PIECES", 8)
     assert pieces.pieces_of(compile_scene(DEEP[0]), SERIES) is None
-    laws_in_lanes.cache_clear()
-    try:
-        assert laws_in_lanes(DEEP[0]).pieces.until < 0.0
-    finally:
-        laws_in_lanes.cache_clear()
+    assert laws_in_lanes(DEEP[0]).pieces.until < 0.0
 
 
 WAVING = Mushroom(

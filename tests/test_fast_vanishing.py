@@ -52,19 +52,11 @@ def test_no_answer_is_wrong(name, seed, tally):
     assert found.counts["agreed"] > N_ATTACKS // 3
 
 
-def forget_compiled_scenes():
-    for remembered in (compile_scene, units.fit):
-        remembered.cache_clear()
-
-
+@pytest.mark.usefixtures("uncached")
 def test_between_deep_waves_some_answers_hang_on_the_bounds(monkeypatch):
     """With the bounds of a law that may be negative they are wrong."""
     monkeypatch.setattr(units, "size_bounds", bounds)
-    forget_compiled_scenes()
-    try:
-        assert attack("deep-waves", N_ATTACKS, 2).cases["wrong"] != []
-    finally:
-        forget_compiled_scenes()
+    assert attack("deep-waves", N_ATTACKS, 2).cases["wrong"] != []
 
 
 def test_the_least_of_a_size_is_positive_and_below_all_values():

@@ -6,6 +6,9 @@ slit, deep floors, plateaus; starts on every wall.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 from mpmath import fp
 
@@ -15,9 +18,18 @@ from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.geometry import table_at
 from scene.laws import value
 
+Start = tuple[FloatArray, int]  # t, its low part, x, y, vx, vy as the kernels take them, and the wall's code
+Draw = Callable[[int, np.random.Generator], tuple[Scene, list[Start]]]  # a scene and so many starts in it
 # Codes of the walls that starts are drawn on, by their number, and how often each.
 BELOW = (records.BASE, records.LEFT, records.RIGHT, records.FLOOR)
 SHARES = {1: [1.0], 4: [0.25] * 4, 5: [0.6, 0.1, 0.1, 0.1, 0.1]}
+
+
+class Group(NamedTuple):
+    """How to draw a scene and starts, and whether particles move unfolded through the base."""
+
+    draw: Draw
+    is_captured: bool = False
 
 
 def draw_scene(random: np.random.Generator) -> Scene:
@@ -69,7 +81,7 @@ def draw_scene(random: np.random.Generator) -> Scene:
     return Mushroom(r=r, w=w, h=h, slope=slope(0.05 * share * least_r / most_h))
 
 
-def draw_start(scene: Scene, random: np.random.Generator) -> tuple[FloatArray, int]:
+def draw_start(scene: Scene, random: np.random.Generator) -> Start:
     """Draw a start on a wall: the state as the kernels take it, and the wall's code."""
     t = _draw_time(scene, random)
     now = table_at(fp, scene, t)
@@ -113,7 +125,7 @@ def _leave_the_arc(
     return now.r * e_x, now.r * e_y, out * e_x - along * e_y, out * e_y + along * e_x
 
 
-def draw_anywhere(n: int, random: np.random.Generator) -> tuple[Scene, list[tuple[FloatArray, int]]]:
+def draw_anywhere(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
     """Draw a scene and n starts in it."""
     scene = draw_scene(random)
     return scene, [draw_start(scene, random) for _ in range(n)]

@@ -8,20 +8,14 @@ much: what holds before may not hold after it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 from mpmath import fp
 
 from fast.kernel import records
+from fast.kernel.records import FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
 from scene.laws import value
-
-Array = npt.NDArray[np.floating[Any]]
-Start = tuple[Array, int]
-Draw = Callable[[int, np.random.Generator], tuple[Scene, list[Start]]]
+from support.lane_anywhere import Draw, Start
 
 
 def at_a_resting_edge(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
@@ -112,7 +106,7 @@ def _moving(mean: float, random: np.random.Generator) -> Law:
     return BangBang(((0.0, mean), (inner, mean + swing * float(random.uniform(-1, 1))), (6.0, mean)))
 
 
-def _times(n: int, random: np.random.Generator) -> Array:
+def _times(n: int, random: np.random.Generator) -> FloatArray:
     return np.column_stack([random.uniform(0.0, 6.0, n), 10.0 ** random.uniform(-2.5, -0.3, n)])
 
 
@@ -124,5 +118,5 @@ def _at(law: Law, t: float) -> float:
     return float(value(fp, law, float(t)))
 
 
-def _state(t: float, s: float, x: float, y: float, x_end: float, y_end: float) -> Array:
+def _state(t: float, s: float, x: float, y: float, x_end: float, y_end: float) -> FloatArray:
     return np.array([t, 0.0, x, y, (x_end - x) / s, (y_end - y) / s])

@@ -8,20 +8,20 @@ answer hangs on a check. Some starts are kept unseen, so that the lanes have som
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
 from fast.kernel import records
+from fast.kernel.records import FloatArray
 from scene import BangBang, Fourier, Law, Mushroom, Wall
 from scene.geometry import TableAt, half_width, table_at
 from scene.laws import is_constant, values
 from scene.tables import laws
+from support.lane_anywhere import Start
 
-Array = npt.NDArray[np.floating[Any]]
-Start = tuple[Array, int]
 N_CROWD, N_INSTANTS = 1500, 96
 LOOK_AHEAD = 0.25  # phase
 MET: tuple[Wall, ...] = ("arc", "right", "left", "floor")
@@ -76,7 +76,7 @@ def _moving(swing: float, random: np.random.Generator) -> Law:
     return BangBang(((0.0, 1.0), (inner, 1.0 - swing), (1.0, 1.0)))
 
 
-def draw_crowd(scene: Mushroom, aim: Aim, random: np.random.Generator) -> Array:
+def draw_crowd(scene: Mushroom, aim: Aim, random: np.random.Generator) -> FloatArray:
     """Draw many starts on the wall of an aim; rows t, x, y, vx, vy, and how far they are looked at."""
     n = N_CROWD
     (moving,) = (law for law in laws(scene).values() if not is_constant(law))
@@ -132,8 +132,8 @@ def draw_crowd(scene: Mushroom, aim: Aim, random: np.random.Generator) -> Array:
 
 
 def chords(
-    now: TableAt, then: TableAt, t: Array, s: Array, random: np.random.Generator
-) -> tuple[Array, Array, Array, Array]:
+    now: TableAt, then: TableAt, t: FloatArray, s: FloatArray, random: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return starts on the arc whose chords, about s long, pass the mouth's edge closely."""
     n, r = len(s), now.r
     edge = np.where(random.random(n) < 0.5, np.maximum(now.w, then.w), now.w)
@@ -151,15 +151,15 @@ def chords(
     return r * e_x, r * e_y, out * e_x - along * e_y, out * e_y + along * e_x
 
 
-def pace_of_arc(scene: Mushroom, t: Array) -> Array:
+def pace_of_arc(scene: Mushroom, t: FloatArray) -> FloatArray:
     """Return the speed of particles at which the arc's function is just concave."""
     now = table_at(fp, scene, t)
     return np.asarray(np.sqrt(np.abs(now.r_rate**2 + now.r * values(scene.r, t, 2))))
 
 
 def slipping(
-    law: Law, t: Array, s: Array, widest: Array, sign: Array, random: np.random.Generator
-) -> tuple[Array, Array, Array, Array]:
+    law: Law, t: FloatArray, s: FloatArray, widest: FloatArray, sign: FloatArray, random: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return starts on the arc from which it comes and goes within s, and the particle is at y = 0 then.
 
     f(u) / u = P(u) - 2 q, where P(u) = (r(u)^2 - r(0)^2) / u - v^2 u and q = x vx + y vy: f is below zero
@@ -185,7 +185,7 @@ def slipping(
     return sign * r * e_x, r * e_y, sign * (out * e_x + along * e_y), out * e_y - along * e_x
 
 
-def comes_and_goes(scene: Mushroom, crowd: Array) -> npt.NDArray[np.bool_]:
+def comes_and_goes(scene: Mushroom, crowd: FloatArray) -> npt.NDArray[np.bool_]:
     """Tell for which starts some f goes below zero and comes back, before the base ends the flight."""
     t, x, y, vx, vy, ahead = crowd[:, :, None].transpose(1, 0, 2)
     s = ahead * np.arange(1, N_INSTANTS + 1) / N_INSTANTS

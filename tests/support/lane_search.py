@@ -19,9 +19,9 @@ from fast.kernel import lanes, pools, records
 from fast.kernel.fine_step import fine_path
 from fast.kernel.records import DEPTH, RATE, FloatArray
 from scene import Scene
-from support.lane_anywhere import draw_anywhere
-from support.lane_draws import AIMS, Start, draw_aimed
-from support.lane_traps import TRAPS, Group
+from support.lane_anywhere import Group, Start, draw_anywhere
+from support.lane_draws import AIMS, draw_aimed
+from support.lane_traps import TRAPS
 
 BOUND = 4.0  # backward ulps
 CLOSE = 2.0**-24  # relative, where no more can be asked: see error_of

@@ -20,27 +20,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import comb
-from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from mpmath import fp
 
 from fast.kernel import records
+from fast.kernel.records import FloatArray
 from scene import BangBang, Fourier, Law, Mushroom, Scene
 from scene.laws import value
+from support.lane_anywhere import Group, Start
 
-Array = npt.NDArray[np.floating[Any]]
-Start = tuple[Array, int]
 N_CROWD = 4_000
 REACH = 0.24  # phase
-
-
-class Group(NamedTuple):
-    """How to draw a scene and starts, and whether particles move unfolded through the base."""
-
-    draw: Callable[[int, np.random.Generator], tuple[Scene, list[Start]]]
-    is_captured: bool = False
 
 
 def corner_over_a_rising_floor(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
@@ -60,7 +51,7 @@ def corner_over_a_rising_floor(n: int, random: np.random.Generator) -> tuple[Sce
     return scene, starts
 
 
-def zero_between(off: Callable[[Array], Array], low: Array, high: Array) -> Array:
+def zero_between(off: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:
     """Return zeros of many functions by bisection, nan where the ends have one sign or off jumps."""
     below = off(low)
     ok = below * off(high) < 0.0
@@ -86,15 +77,15 @@ def misled_chord(n: int, random: np.random.Generator) -> tuple[Scene, list[Start
     u_1, n_steps = REACH * random.uniform(0.3, 0.8, N_CROWD), int(random.integers(1, 3))
     r, rate, bend = mean - np.cos(t), np.sin(t), np.cos(t)
 
-    def grown(u: Array) -> Array:  # (r(t + u)^2 - r(t)^2) / u
+    def grown(u: FloatArray) -> FloatArray:  # (r(t + u)^2 - r(t)^2) / u
         d = np.cos(t) - np.cos(t + u)
         return np.asarray(d * (2.0 * r + d) / u)
 
-    def motion(u_3: Array) -> tuple[Array, Array]:
+    def motion(u_3: FloatArray) -> tuple[FloatArray, FloatArray]:
         v2 = (grown(u_3) - grown(u_1)) / (u_3 - u_1)
         return v2, 0.5 * (grown(u_1) - v2 * u_1)
 
-    def missed(u_3: Array) -> Array:
+    def missed(u_3: FloatArray) -> FloatArray:
         v2, q = motion(u_3)
         s = 2.0 * (r * rate - q) / (v2 - rate**2 - r * bend)
         for _ in range(n_steps):
@@ -131,10 +122,10 @@ def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]
     nu = Fourier(0.5, 1.0, (float(0.5 * other * np.cos(phi)),), (float(-0.5 * other * np.sin(phi)),))
     t, n_steps = np.pi - 0.5 * phi + random.uniform(-0.2, 0.1, N_CROWD), int(random.integers(1, 4))
 
-    def w(u: Array | float) -> Array:
+    def w(u: FloatArray | float) -> FloatArray:
         return np.asarray(0.5 * (1.0 + swing * np.cos(t + u)) * (1.0 + other * np.cos(t + u + phi)))
 
-    def rate(u: Array | float) -> Array:
+    def rate(u: FloatArray | float) -> FloatArray:
         one, two = t + u, t + u + phi
         return np.asarray(
             -0.5 * swing * np.sin(one) * (1.0 + other * np.cos(two))
@@ -144,11 +135,11 @@ def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]
     bend = -0.5 * (swing * np.cos(t) + other * np.cos(t + phi) + 2.0 * swing * other * np.cos(2.0 * t + phi))
     u_1 = REACH * random.uniform(0.2, 0.9, N_CROWD)
 
-    def motion(u_2: Array) -> tuple[Array, Array]:
+    def motion(u_2: FloatArray) -> tuple[FloatArray, FloatArray]:
         v = (w(u_2) - w(u_1)) / (u_2 - u_1)
         return v, w(u_1) - v * u_1
 
-    def missed(u_2: Array) -> Array:
+    def missed(u_2: FloatArray) -> FloatArray:
         v, x = motion(u_2)
         s = (w(0.0) - x) / (v - rate(0.0))
         s = s * (1.0 + 0.5 * bend * s / (v - rate(0.0)))

@@ -1,4 +1,4 @@
-"""Flow: given particles to a given time, against trajectories; bad starts are refused by number."""
+"""`fast.flow`, given particles to a given time, and `fast.follow`, to a capture, a release or an energy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,19 @@ import fast
 from fast import __main__ as served
 from fast import starts
 from fast.ensemble import UNDECIDED
-from scene import BangBang, Cap, Fourier, Horizon, InvalidState, Rejected, State, Undecided, Undefined, load
+from scene import (
+    BadInput,
+    BangBang,
+    Cap,
+    Fourier,
+    Horizon,
+    InvalidState,
+    Rejected,
+    State,
+    Undecided,
+    Undefined,
+    load,
+)
 from scene.geometry import table_at
 from scene.protocol.wire import serve
 
@@ -196,3 +208,67 @@ def test_protocol_1_serves_flow_and_time():
     last = steps(load("frozen-mushroom"), State(**good), 30, math.inf)[-1]
     assert not isinstance(last, Rejected)
     assert timed["steps"][0]["outcome"] == "collision"
+
+
+def drawn(n, energy):
+    return [State(t, *place) for t, _, *place in starts.initial_states(SCENE, n, energy, 3).tolist()]
+
+
+def test_captures_and_releases_are_those_of_a_flow():
+    """So slow that some tens of collisions do not part what lanes and a trajectory round otherwise."""
+    states, end, n_captured, n_released = drawn(60, 20.0), SCENE.period, 0, 0
+    flown = fast.flow(SCENE, states, end)
+    for capture, release, t_in, t_out in zip(
+        fast.follow(SCENE, states, "capture", end),
+        fast.follow(SCENE, states, "release", end),
+        flown.t_in.tolist(),
+        flown.t_out.tolist(),
+        strict=True,
+    ):
+        assert (capture.state is not None) == np.isfinite(t_in)
+        if capture.state is not None:
+            n_captured += 1
+            assert capture.state.wall == "arc"
+            assert capture.state.t == pytest.approx(t_in, abs=1e-6)
+        if release.state is not None:
+            n_released += 1
+            assert release.state.t == pytest.approx(t_out, abs=1e-6)
+    assert n_captured >= n_released > 5
+
+
+def test_an_energy_is_reached_from_either_side_at_the_first_collision_with_it():
+    (start,) = drawn(1, 1e4)
+    path = fast.trajectory(SCENE, start, 5000)
+    energies = (path.steps[:, 4] ** 2 + path.steps[:, 5] ** 2) / 2
+    for wanted in (energies.max(), energies.min()):
+        found = fast.follow(SCENE, start, float(wanted), n_collisions=5000)
+        is_there = energies >= wanted if wanted > 1e4 else energies <= wanted
+        assert found.n_collisions == 1 + int(np.flatnonzero(is_there)[0])
+        assert found.state.t == path.steps[found.n_collisions - 1, 1]
+
+
+def test_what_does_not_happen_has_no_state():
+    states = drawn(2, 1e4)
+    found = fast.follow(SCENE, states, 1e9, t_end=0.5)
+    assert [one.state for one in found] == [None, None]
+    assert all(isinstance(one.outcome, Horizon) for one in found)
+    assert fast.follow(SCENE, states[0], 1e9, n_collisions=7) == (None, 7, None)
+    assert fast.follow(SCENE, [], "capture") == []
+
+
+@pytest.mark.parametrize(
+    ("scene", "states", "until", "more", "words"),
+    [
+        ("fermi-ulam", None, "capture", {}, "until = 'capture': table is stem, must be mushroom"),
+        ("moving-cap", None, "escape", {}, "until = 'escape', must be capture, release or an energy"),
+        ("moving-cap", None, -1.0, {}, "energy = -1.0, must be > 0"),
+        ("moving-cap", None, None, {}, "energy = None"),
+        ("moving-cap", None, 1.0, {"n_collisions": 0}, "n_collisions = 0"),
+        ("moving-cap", None, 1.0, {"t_end": "late"}, "t_end = 'late'"),
+        ("moving-cap", "here", 1.0, {}, "states = 'here'"),
+    ],
+)
+def test_what_cannot_be_followed_to_is_refused(scene, states, until, more, words):
+    start = states or State(0.0, 0.1, -0.1, 1.0, 0.5)
+    with pytest.raises(BadInput, match=words.replace("(", r"\(")):
+        fast.follow(load(scene), start, until, **more)

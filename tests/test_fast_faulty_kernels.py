@@ -43,17 +43,17 @@ FAULTS = {
         "s_low, rest = 0.0, 0.0",
     ),
     "a wall that has come back": (
-        "test_fast_rounded_times",
+        "test_fast_horizons",
         "judge('after a spike')[1] > 0",
         *("scalar_step.py", "if side > 0 and s < limit:", "if s < 0.0:"),
     ),
     "the mouth's own motion": (
-        "test_fast_rounded_times",
+        "test_fast_horizons",
         "judge('beside a moving mouth')[1] > 0",
         *("walls.py", "rounding * (abs(vx) + drift)", "rounding * abs(vx)"),
     ),
     "what is wrong with f' on the way": (
-        "test_fast_rounded_times",
+        "test_fast_horizons",
         "judge('along a leaning side')[1] > 0",
         *("scalar_step.py", "(error + slope_error * h) / -slope", "error / -slope"),
     ),

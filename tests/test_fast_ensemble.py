@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpmath import fp
 from scipy import stats
 
 import fast
 from fast.starts import cycle_stops, initial_states
 from scene import BadInput, Fourier, Mushroom, State, load
+from scene.geometry import table_at
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "breathing-circle", "fermi-ulam"])
@@ -64,16 +66,14 @@ def test_starts_are_uniform_in_the_table(name):
     assert np.allclose(vx**2 + vy**2, 1.0)
     assert stats.kstest(np.arctan2(vy, vx), stats.uniform(-np.pi, 2 * np.pi).cdf).pvalue > 1e-4
     # Independent: uniform points of the bounding box, kept where the table is.
-    r = {"fermi-ulam": 0.0}.get(name, 1.0)
-    w = {"breathing-circle": 0.0}.get(name, 1.0)
-    h = {"moving-cap": 1.0, "fixed-cap-anticlockwise": 6.0, "breathing-circle": 0.0, "fermi-ulam": 1.0}[name]
-    slope = {"moving-cap": 0.1111, "fixed-cap-anticlockwise": np.tan(np.radians(2.3))}.get(name, 0.0)
-    box = np.random.default_rng(3).uniform((-1, -h), (1, r), size=(200_000, 2))
-    in_cap = (box[:, 1] >= 0) & (np.hypot(*box.T) <= r)
-    in_stem = (box[:, 1] < 0) & (np.abs(box[:, 0]) <= w + slope * box[:, 1])
-    kept = box[in_cap | in_stem]
-    assert stats.ks_2samp(x, kept[:, 0]).pvalue > 1e-4
-    assert stats.ks_2samp(y, kept[:, 1]).pvalue > 1e-4
+    now = table_at(fp, scene, states[0, 0])
+    wide = max(now.r, now.half_width(-now.h), now.w)
+    across, up = np.random.default_rng(3).uniform((-wide, -now.h), (wide, now.r), size=(200_000, 2)).T
+    in_cap = (up >= 0) & (np.hypot(across, up) <= now.r)
+    in_stem = (up < 0) & (np.abs(across) <= now.half_width(up))
+    kept = in_cap | in_stem
+    assert stats.ks_2samp(x, across[kept]).pvalue > 1e-4
+    assert stats.ks_2samp(y, up[kept]).pvalue > 1e-4
 
 
 def test_frozen_table_keeps_energy_and_island():

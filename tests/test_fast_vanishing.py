@@ -12,8 +12,6 @@ import os
 
 import numpy as np
 import pytest
-from mpmath import MPContext
-from support.from_python import from_python
 
 import fast
 import reference
@@ -25,17 +23,12 @@ from conformance.cases.scenes import deep_wave
 from conformance.cases.table import FAMILIES
 from fast import pieces, units
 from fast.batch import lane_steps
-from fast.kernel.lane_laws import law_at
-from fast.kernel.records import DEPTH
-from fast.pieces import laws_in_lanes
 from fast.units import compile_scene
 from scene import Cap, Fourier, Horizon, Mushroom, State, Stem
-from scene.laws import bounds, value, values
+from scene.laws import bounds, values
 from scene.sizes import size_bounds
 
 N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "100"))
-CTX = MPContext()
-CTX.dps = 50
 
 
 def attack(name, n_cases, seed):
@@ -111,26 +104,3 @@ def test_lanes_meet_what_is_left(n, left, tally):
         tally[judged.kind] += 1
         assert judged.kind == "agreed", judged
     assert tally["agreed"] > 30
-
-
-def worst_of_lanes(law, spoil):
-    """Return how far polynomials are from a law, in units of 2^-53 of its value where each piece serves."""
-    scene = Stem(w=1.0, h=law)
-    in_lanes, worst = laws_in_lanes(scene), 0.0
-    p, degree = in_lanes.pieces, (0,) * in_lanes.degree
-    for i in range(len(p.begins)):
-        out = p.coefficients[i, DEPTH].copy()
-        if spoil:
-            out[0] += 2.0**-54  # as waves would be rounded that add up to the mean
-        for u in (-p.limits[i], 0.5 * p.limits[i], p.limits[i]):
-            found = from_python(law_at)(out, 0, 1, u, u, degree)[0]
-            true = value(CTX, law, sum(map(CTX.mpf, (*p.references[i], u))))
-            worst = max(worst, float(abs(found - true) / true) * 2.0**53)
-    return worst
-
-
-@pytest.mark.parametrize("turn", [0.0, 0.3])
-def test_a_piece_is_right_to_a_few_last_places_however_little_is_left(turn):
-    law = sunk(4, 1e-6, turn)
-    assert worst_of_lanes(law, spoil=False) < 8.0
-    assert worst_of_lanes(law, spoil=True) > 100.0

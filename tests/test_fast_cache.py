@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -69,38 +70,32 @@ def entry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Kept:
     return Kept(tmp_path)
 
 
-def flipped(share: float) -> Callable[[Path], object]:
-    def damage(path: Path) -> None:
-        content = bytearray(path.read_bytes())
-        content[int(share * (len(content) - 1))] ^= 1
-        path.write_bytes(content)
-
-    return damage
+def flip(share: float, path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[int(share * (len(content) - 1))] ^= 1
+    path.write_bytes(content)
 
 
-def cut(share: float) -> Callable[[Path], object]:
-    return lambda path: os.truncate(path, int(share * path.stat().st_size))
+def cut(share: float, path: Path) -> None:
+    os.truncate(path, int(share * path.stat().st_size))
 
 
-def replaced(make: Callable[[Path], object]) -> Callable[[Path], object]:
-    def damage(path: Path) -> None:
-        path.unlink()
-        make(path)
-
-    return damage
+def replace(make: Callable[[Path], object], path: Path) -> None:
+    path.unlink()
+    make(path)
 
 
-DAMAGES = {
-    "emptied": cut(0.0),
-    "cut early": cut(0.02),
-    "cut": cut(0.5),
-    "cut late": cut(0.999),
-    **{f"a bit at {share}": flipped(share) for share in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)},
+DAMAGES: dict[str, Callable[[Path], object]] = {
+    "emptied": partial(cut, 0.0),
+    "cut early": partial(cut, 0.02),
+    "cut": partial(cut, 0.5),
+    "cut late": partial(cut, 0.999),
+    **{f"a bit at {share}": partial(flip, share) for share in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)},
     "noise": lambda path: path.write_bytes(os.urandom(5000)),
     "another object": lambda path: path.write_bytes(pickle.dumps({"an": "object"})),
-    "a folder": replaced(lambda path: (path / "in").mkdir(parents=True)),
-    "not to be read": replaced(lambda path: path.symlink_to(path)),
-    "missing": replaced(lambda _: None),
+    "a folder": partial(replace, lambda path: (path / "in").mkdir(parents=True)),
+    "not to be read": partial(replace, lambda path: path.symlink_to(path)),
+    "missing": Path.unlink,
 }
 
 

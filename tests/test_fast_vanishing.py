@@ -73,13 +73,6 @@ def test_what_samples_do_not_show_to_be_positive_is_told_to_be_0():
     assert flow.n_careful.sum() >= flow.wall_counts.sum() > 10
 
 
-def test_a_product_of_two_lows_below_0_is_no_low():
-    """Both factors' bounds are negative, their product is above the mouth's least width."""
-    r, nu = Fourier(1.0, cos=(0.9, 0.0, -0.35), period=1.0), Fourier(0.5, cos=(0.45, 0.0, -0.17), period=1.0)
-    met = fast.next_collision(Mushroom(r=r, h=1.0, nu=nu), State(0.297, -0.024, -0.56, -0.035, -0.87), 2.297)
-    assert (met.wall, met.dt) == ("left", pytest.approx(0.032594, rel=1e-4))
-
-
 def test_who_is_inside_a_mouth_of_1e_13_is_let_through_it():
     w = Fourier(mean=0.5000000000001, cos=(-0.38242109364224425,), sin=(-0.3221088436188455,), period=1.0)
     scene, t = Mushroom(r=1.5, w=w, h=1.0), 0.11140847644675131

@@ -23,6 +23,8 @@ from support.entries import kept_entries
 import fast
 from conformance.suite import run as suite
 from conformance.vectors import Vector, load
+from fast.pieces import laws_in_lanes
+from fast.units import compile_scene, fit
 from mushrooms.main import run
 from scene import Scene
 
@@ -127,6 +129,17 @@ def tally(request: pytest.FixtureRequest) -> Iterator[Counter[str]]:
 def unsynced(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave files to the system's buffers: no test can cut the power, and a busy disk would take minutes."""
     monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
+
+
+@pytest.fixture
+def uncached() -> Iterator[None]:
+    """Forget what was made of scenes, for a test that changes how it is made, and what it made afterwards."""
+    made = (compile_scene, fit, laws_in_lanes)
+    for each in made:
+        each.cache_clear()
+    yield
+    for each in made:
+        each.cache_clear()
 
 
 @pytest.fixture

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpmath import fp
 from scipy import stats
 
 import fast
 from fast.starts import cycle_stops, initial_states
-from scene import BadInput, State, load
-
-
-def test_more_particles_keep_the_first_ones():
-    few = fast.simulate(load("fixed-cap-clockwise"), n_particles=20, energy=1e4, seed=1)
-    many = fast.simulate(load("fixed-cap-clockwise"), n_particles=90, energy=1e4, seed=1)
-    assert np.array_equal(few.cycle_energies, many.cycle_energies[:20])
-    other = fast.simulate(load("fixed-cap-clockwise"), n_particles=20, energy=1e4, seed=2)
-    assert not np.array_equal(few.energy, other.energy)
+from scene import BadInput, Fourier, Mushroom, State, load
+from scene.geometry import table_at
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "breathing-circle", "fermi-ulam"])
@@ -34,19 +28,18 @@ def test_particles_start_alike_in_every_block(name):
 
 
 def test_blocks_are_parts_of_the_whole():
-    whole = fast.simulate(load("moving-cap"), n_particles=90, energy=1e3, n_cycles=2, seed=4)
+    """Also in what they would go on from."""
+    scene, asked = load("moving-cap"), {"energy": 300.0, "n_cycles": 2, "seed": 4}
+    whole = fast.go_on(scene, n_particles=90, **asked)
     for first, n in ((0, 1), (1, 88), (37, 53)):
-        part = fast.simulate(load("moving-cap"), n_particles=n, energy=1e3, n_cycles=2, seed=4, first=first)
-        for got, wanted in zip(part[1:-2], whole[1:-2], strict=True):
+        part = fast.go_on(scene, n_particles=n, first=first, **asked)
+        ones, others = ((*run.ensemble[1:-2], run.lanes) for run in (part, whole))
+        for got, wanted in zip(ones, others, strict=True):
             assert np.array_equal(got, wanted[first : first + n], equal_nan=True)
+    other = fast.go_on(scene, n_particles=90, **asked | {"seed": 5})
+    assert not np.array_equal(other.ensemble.energy, whole.ensemble.energy)
     with pytest.raises(BadInput, match="first = -1, must be 0 to"):
-        fast.simulate(load("moving-cap"), n_particles=1, energy=1e3, first=-1)
-
-
-def test_cycles_continue_one_another():
-    one = fast.simulate(load("moving-cap"), n_particles=30, energy=1e3, n_cycles=1)
-    three = fast.simulate(load("moving-cap"), n_particles=30, energy=1e3, n_cycles=3)
-    assert np.array_equal(one.cycle_energies[:, 0], three.cycle_energies[:, 0])
+        fast.simulate(scene, n_particles=1, energy=1e3, first=-1)
 
 
 def test_each_cycle_has_its_means_and_their_errors():
@@ -73,16 +66,14 @@ def test_starts_are_uniform_in_the_table(name):
     assert np.allclose(vx**2 + vy**2, 1.0)
     assert stats.kstest(np.arctan2(vy, vx), stats.uniform(-np.pi, 2 * np.pi).cdf).pvalue > 1e-4
     # Independent: uniform points of the bounding box, kept where the table is.
-    r = {"fermi-ulam": 0.0}.get(name, 1.0)
-    w = {"breathing-circle": 0.0}.get(name, 1.0)
-    h = {"moving-cap": 1.0, "fixed-cap-anticlockwise": 6.0, "breathing-circle": 0.0, "fermi-ulam": 1.0}[name]
-    slope = {"moving-cap": 0.1111, "fixed-cap-anticlockwise": np.tan(np.radians(2.3))}.get(name, 0.0)
-    box = np.random.default_rng(3).uniform((-1, -h), (1, r), size=(200_000, 2))
-    in_cap = (box[:, 1] >= 0) & (np.hypot(*box.T) <= r)
-    in_stem = (box[:, 1] < 0) & (np.abs(box[:, 0]) <= w + slope * box[:, 1])
-    kept = box[in_cap | in_stem]
-    assert stats.ks_2samp(x, kept[:, 0]).pvalue > 1e-4
-    assert stats.ks_2samp(y, kept[:, 1]).pvalue > 1e-4
+    now = table_at(fp, scene, states[0, 0])
+    wide = max(now.r, now.half_width(-now.h), now.w)
+    across, up = np.random.default_rng(3).uniform((-wide, -now.h), (wide, now.r), size=(200_000, 2)).T
+    in_cap = (up >= 0) & (np.hypot(across, up) <= now.r)
+    in_stem = (up < 0) & (np.abs(across) <= now.half_width(up))
+    kept = in_cap | in_stem
+    assert stats.ks_2samp(x, across[kept]).pvalue > 1e-4
+    assert stats.ks_2samp(y, up[kept]).pvalue > 1e-4
 
 
 def test_frozen_table_keeps_energy_and_island():
@@ -96,12 +87,24 @@ def test_frozen_table_keeps_energy_and_island():
     assert captured == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 4000))
 
 
-def test_least_nu_is_found():
-    stops = cycle_stops(load("moving-cap"), 2, (0.25,))
-    assert stops.times == pytest.approx(np.array([1, 2, 4, 5, 6, 8]) * np.pi / 2)
+@pytest.mark.parametrize(
+    ("name", "phase", "times"),
+    [
+        ("moving-cap", 0.25, [0.25, 0.5, 1, 1.25, 1.5, 2]),
+        ("narrowest at the end", 0.5, [0.5, 1, 1, 1.5, 2, 2]),  # before the end of its cycle
+    ],
+)
+def test_least_nu_is_found(name, phase, times):
+    at_the_end = Mushroom(r=1.0, h=1.0, nu=Fourier(mean=0.6, omega=1.0, cos=(-0.3,)))
+    stops = cycle_stops(load(name) if name == "moving-cap" else at_the_end, 2, (phase,))
+    assert stops.times == pytest.approx(np.array(times) * 2 * np.pi)
     assert stops.columns.tolist() == [0, -1, 1, 2, -1, 3]
     assert stops.cycles.tolist() == [-1, -1, 0, -1, -1, 1]
-    assert stops.mouth_minima == pytest.approx(np.array([[np.pi], [3 * np.pi]]), rel=1e-15)
+
+
+def test_mouth_minima_are_times():
+    minima = cycle_stops(load("moving-cap"), 2, (0.25,)).mouth_minima
+    assert minima == pytest.approx(np.array([[np.pi], [3 * np.pi]]), rel=1e-15)
     assert cycle_stops(load("fixed-cap-anticlockwise"), 1, ()).mouth_minima.tolist() == [[0.375]]
 
 

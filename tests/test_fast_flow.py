@@ -1,4 +1,4 @@
-"""Flow: given particles to a given time, against trajectories; bad starts are refused by number."""
+"""`fast.flow`, given particles to a given time, and `fast.follow`, to a capture, a release or an energy."""
 
 from __future__ import annotations
 
@@ -14,12 +14,36 @@ import fast
 from fast import __main__ as served
 from fast import starts
 from fast.ensemble import UNDECIDED
-from scene import BangBang, Cap, Fourier, Horizon, InvalidState, Rejected, State, Undecided, Undefined, load
+from scene import (
+    BadInput,
+    BangBang,
+    Cap,
+    Fourier,
+    Horizon,
+    InvalidState,
+    Rejected,
+    State,
+    Undecided,
+    Undefined,
+    load,
+)
 from scene.geometry import table_at
 from scene.protocol.wire import serve
 
 SCENE = load("moving-cap")
+WALLS = ("arc", "base", "left", "right", "floor")
 STARTS = [State(0.25 * k, 0.1 - 0.01 * k, 0.3, 25.0 + k, -7.0 * k) for k in range(5)]
+
+
+def flow_of(scene, state, t_end):
+    return fast.flow(scene, [state], t_end).outcomes[0]
+
+
+def ends(scene, state, t_end, flow=flow_of):
+    """Return where a flow and a path end: x, y, vx, vy; nothing of a flow that is lost."""
+    found, path = flow(scene, state, t_end), fast.trajectory(scene, state, 10_000, t_end)
+    assert isinstance(path.outcome, Horizon)
+    return [(o.x, o.y, o.vx, o.vy) if isinstance(o, Horizon) else () for o in (found, path.outcome)]
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "breathing-circle", "fermi-ulam", "frozen-mushroom"])
@@ -28,15 +52,13 @@ def test_flow_ends_where_the_trajectory_does(name):
     y = -0.3 if name == "fermi-ulam" else 0.3
     states = [State(0.25 * k, 0.1 - 0.01 * k, y, 25.0 + k, -7.0 * k - 1.0) for k in range(5)]
     run = fast.flow(scene, states, 2.0)
-    for state, outcome, counts in zip(states, run.outcomes, run.wall_counts, strict=True):
-        path = fast.trajectory(scene, state, 10_000, t_end=2.0)
-        assert isinstance(outcome, Horizon)
-        assert isinstance(path.outcome, Horizon)
-        assert counts.sum() == len(path.walls)
-        assert counts[0] == path.walls.count("arc")
+    assert run.outcomes == [flow_of(scene, state, 2.0) for state in states]
+    for state, counts in zip(states, run.wall_counts, strict=True):
         # Chaos multiplies rounding: some tens of hits lose as many bits.
-        ends = [(o.x, o.y, o.vx, o.vy) for o in (outcome, path.outcome)]
-        assert ends[0] == pytest.approx(ends[1], rel=1e-5, abs=1e-5)
+        found, expected = ends(scene, state, 2.0)
+        assert found == pytest.approx(expected, rel=1e-5, abs=1e-5)
+        path = fast.trajectory(scene, state, 10_000, t_end=2.0)
+        assert counts.tolist() == [path.walls.count(wall) for wall in WALLS]
 
 
 def test_who_gathers_speed_for_ever_is_given_up(monkeypatch):
@@ -77,13 +99,9 @@ def test_through_the_centre_and_unfolded_all_the_same(name, tally):
         state = State(0.0, k * p, k * abs(q), m * p, m * abs(q))
         assert state.x * state.vy == state.y * state.vx
         t_end = float(random.integers(1, 60)) / 8 + 0.01
-        (outcome,) = fast.flow(scene, [state], t_end).outcomes
-        path = fast.trajectory(scene, state, 10_000, t_end=t_end)
-        assert isinstance(outcome, Horizon)
-        assert isinstance(path.outcome, Horizon)
-        assert outcome.y >= 0
-        ends = [(o.x, o.y, o.vx, o.vy) for o in (outcome, path.outcome)]
-        assert ends[0] == pytest.approx(ends[1], rel=1e-9, abs=1e-9)
+        found, expected = ends(scene, state, t_end)
+        assert found[1] >= 0
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
         tally["through the centre"] += 1
 
 
@@ -102,18 +120,13 @@ def lost_in_slow_caps(flow, n):
             speed, angle = random.uniform(0.4, 2.5), random.uniform(0.0, 2 * np.pi)
             t, velocity = float(random.uniform(0.0, 8.0)), speed * np.exp(1j * angle)
             state = State(t, x, y, float(velocity.real), float(velocity.imag))
-            found, path = flow(scene, state, t + 8.0), fast.trajectory(scene, state, 1000, t + 8.0)
-            ends = [(o.x, o.y, o.vx, o.vy) if isinstance(o, Horizon) else () for o in (found, path.outcome)]
-            assert ends[1]
-            n_lost += ends[0] != pytest.approx(ends[1], rel=1e-6, abs=1e-6)
+            found, expected = ends(scene, state, t + 8.0, flow)
+            n_lost += found != pytest.approx(expected, rel=1e-6, abs=1e-6)
     return n_lost
 
 
 def test_slow_particles_of_a_cap_are_not_lost():
-    def flow(scene, state, t_end):
-        return fast.flow(scene, [state], t_end).outcomes[0]
-
-    assert lost_in_slow_caps(flow, 60) == 0
+    assert lost_in_slow_caps(flow_of, 60) == 0
 
 
 def test_a_flow_that_forgets_which_wall_was_met_last_loses_them():
@@ -144,8 +157,7 @@ def test_the_first_captured_stay():
     run = fast.flow(scene, [inside, through], 9.0)
     first = fast.next_collision(scene, inside, 9.0)
     assert (run.t_in[0], run.t_out[0]) == (first.t, 9.0)
-    assert np.isnan(run.t_in[1])
-    assert np.isnan(run.t_out[1])
+    assert np.isnan((run.t_in[1], run.t_out[1])).all()
 
 
 def test_a_bad_start_is_refused_by_its_number():
@@ -196,3 +208,67 @@ def test_protocol_1_serves_flow_and_time():
     last = steps(load("frozen-mushroom"), State(**good), 30, math.inf)[-1]
     assert not isinstance(last, Rejected)
     assert timed["steps"][0]["outcome"] == "collision"
+
+
+def drawn(n, energy):
+    return [State(t, *place) for t, _, *place in starts.initial_states(SCENE, n, energy, 3).tolist()]
+
+
+def test_captures_and_releases_are_those_of_a_flow():
+    """So slow that some tens of collisions do not part what lanes and a trajectory round otherwise."""
+    states, end, n_captured, n_released = drawn(60, 20.0), SCENE.period, 0, 0
+    flown = fast.flow(SCENE, states, end)
+    for capture, release, t_in, t_out in zip(
+        fast.follow(SCENE, states, "capture", end),
+        fast.follow(SCENE, states, "release", end),
+        flown.t_in.tolist(),
+        flown.t_out.tolist(),
+        strict=True,
+    ):
+        assert (capture.state is not None) == np.isfinite(t_in)
+        if capture.state is not None:
+            n_captured += 1
+            assert capture.state.wall == "arc"
+            assert capture.state.t == pytest.approx(t_in, abs=1e-6)
+        if release.state is not None:
+            n_released += 1
+            assert release.state.t == pytest.approx(t_out, abs=1e-6)
+    assert n_captured >= n_released > 5
+
+
+def test_an_energy_is_reached_from_either_side_at_the_first_collision_with_it():
+    (start,) = drawn(1, 1e4)
+    path = fast.trajectory(SCENE, start, 5000)
+    energies = (path.steps[:, 4] ** 2 + path.steps[:, 5] ** 2) / 2
+    for wanted in (energies.max(), energies.min()):
+        found = fast.follow(SCENE, start, float(wanted), n_collisions=5000)
+        is_there = energies >= wanted if wanted > 1e4 else energies <= wanted
+        assert found.n_collisions == 1 + int(np.flatnonzero(is_there)[0])
+        assert found.state.t == path.steps[found.n_collisions - 1, 1]
+
+
+def test_what_does_not_happen_has_no_state():
+    states = drawn(2, 1e4)
+    found = fast.follow(SCENE, states, 1e9, t_end=0.5)
+    assert [one.state for one in found] == [None, None]
+    assert all(isinstance(one.outcome, Horizon) for one in found)
+    assert fast.follow(SCENE, states[0], 1e9, n_collisions=7) == (None, 7, None)
+    assert fast.follow(SCENE, [], "capture") == []
+
+
+@pytest.mark.parametrize(
+    ("scene", "states", "until", "more", "words"),
+    [
+        ("fermi-ulam", None, "capture", {}, "until = 'capture': table is stem, must be mushroom"),
+        ("moving-cap", None, "escape", {}, "until = 'escape', must be capture, release or an energy"),
+        ("moving-cap", None, -1.0, {}, "energy = -1.0, must be > 0"),
+        ("moving-cap", None, None, {}, "energy = None"),
+        ("moving-cap", None, 1.0, {"n_collisions": 0}, "n_collisions = 0"),
+        ("moving-cap", None, 1.0, {"t_end": "late"}, "t_end = 'late'"),
+        ("moving-cap", "here", 1.0, {}, "states = 'here'"),
+    ],
+)
+def test_what_cannot_be_followed_to_is_refused(scene, states, until, more, words):
+    start = states or State(0.0, 0.1, -0.1, 1.0, 0.5)
+    with pytest.raises(BadInput, match=words.replace("(", r"\(")):
+        fast.follow(load(scene), start, until, **more)

@@ -11,43 +11,29 @@ import numpy as np
 import pytest
 from support.depth import deep_among
 from support.faulty_kernels import faulty_lanes
-from support.lane_corners import CORNERS, at_the_end_of_a_chord
-from support.lane_draws import GROUPS, draw_starts
-from support.lane_draws import draw_scene as draw_directed_scene
-from support.lane_search import ANYWHERE, Round, draw_scene, draw_start, search
-from support.lane_ties import TIES, wrong_walls
-from support.lane_traps import TRAPS
+from support.lane_anywhere import draw_anywhere
+from support.lane_corners import CORNERS
+from support.lane_search import ANYWHERE, GROUPS, Round, search
 
 import fast
 import reference
 from fast.batch import LaneRound, lane_steps
-from fast.kernel import lanes, pools, records
+from fast.kernel import lanes, pools
 from fast.step import WALL_NAMES
-from scene import Cap, Collision, Fourier, Mushroom, Rejected, State
+from scene import Cap, Collision, Mushroom, Rejected, State
 
 N_ANSWERS = int(os.environ.get("MUSHROOMS_LANE_ANSWERS", "150"))  # of each group of draws
 
 
-@pytest.mark.parametrize("group", deep_among([ANYWHERE, *GROUPS, *TRAPS], "misled chord", "misled side"))
+@pytest.mark.parametrize("group", deep_among(GROUPS, "misled chord", "misled side"))
 def test_no_lane_answer_is_wrong(group, tally):
     assert search(11, N_ANSWERS, tally, group) == []
-
-
-def test_the_arc_that_comes_and_goes_on_the_way_to_the_base():
-    """Near the least radius f of the arc dips below zero and comes back: two hits, not one."""
-    scene = Mushroom(r=Fourier(1.0, 1.0, (0.9,)), h=1.0, w=0.0005)
-    state = State(
-        3.116786370335045, 0.09723691417765834, 0.024502880446325, 0.05208237622567096, -0.29708987593890235
-    )
-    run = fast.flow(scene, [state], 3.377786370335045)
-    assert run.wall_counts.tolist() == [[2, 1, 0, 0, 0]]
 
 
 def test_lanes_alone_take_the_careful_steps_and_no_free_starts(tally):
     random = np.random.default_rng(8)
     for _ in range(12):
-        scene = draw_scene(random)
-        starts = [draw_start(scene, random) for _ in range(24)]
+        scene, starts = draw_anywhere(24, random)
         rows = [(tuple(float(v) for v in np.delete(p, 1)), wall) for p, wall in starts]
         on_walls = [State(*row, WALL_NAMES[wall]) for row, wall in rows]
         free = [State(*row) for row, _ in rows]
@@ -232,12 +218,10 @@ def test_uncompiled_lanes_give_the_bits_of_compiled_ones(group):
     """Mutants run uncompiled; what is not spoilt in them is what users run."""
     random, aim = np.random.default_rng(7), GROUPS[group]
     for _ in range(4):
-        scene = draw_directed_scene(aim, random)
-        starts = draw_starts(scene, aim, pools.LANES, random)
+        scene, starts = aim.draw(pools.LANES, random)
         one, other = (Round(scene, k, is_captured=aim.is_captured) for k in (lanes, faulty_lanes("", "")))
-        for lane, start in enumerate(starts):
-            one.fill(lane, *start)
-            other.fill(lane, *start)
+        one.fill_all(starts)
+        other.fill_all(starts)
         for found, again in zip(one.step(len(starts)), other.step(len(starts)), strict=True):
             assert np.array_equal(found, again, equal_nan=True)
 
@@ -261,106 +245,63 @@ def test_the_search_kills(name, tally):
     assert wrong
 
 
-def count_wrong_walls(draw, kernels, tally):
-    random = np.random.default_rng(3)
-    for _ in range(40):
-        scene, starts = TIES[draw](pools.LANES, random)
-        answered, wrong = wrong_walls(Round(scene, kernels), scene, starts)
-        tally["answered"] += answered
-        tally["wrong"] += wrong
-        if wrong:
-            break
-    return tally["wrong"]
-
-
-# Terms of rounding, and the draw of ties that misses each.
-ROUNDING = {
-    "the mouth's edge": (
-        "at the mouth's edge",
-        "doubt = fma(SAFETY * rise, fma(size + abs(x), rise, (abs(vx) + rate_w) * depth), doubt)",
-        "doubt = doubt + 0.0",
-    ),
-    "the height at the end": (
-        "at the end of the arc",
-        "place -= fma(abs(vy), fma(SAFETY, s, slack), SAFETY * abs(y))",
-        "place -= 0.0",
-    ),
-    "the base inside the arc": (
-        "at the end of the arc",
-        "inside = fma(-SAFETY, fma(abs(vx), s, limits.size + abs(x)), r - abs(x_s))",
-        "inside = r - abs(x_s)",
-    ),
-    "walls that are not met": (
-        "at the floor's corner",
-        "blur)\n    return fma(fma(limits.lean, abs(outset.vy), abs(outset.vx)) + limits.rate, slack, far)",
-        "0.0)\n    return far",
-    ),
-}
-
-
-NO_SLACK = ("return slack if error < s else 0.0", "return 0.0")
-
-
-def count_wrong_corners(draw, kernels, n_scenes, tally):
+def count_wrong_walls(draw, kernels, n_scenes, tally):
+    """Count the lane answers near a corner that name another wall than the one that is proved to be first."""
     random = np.random.default_rng(5)
     for _ in range(n_scenes):
         scene, starts = CORNERS[draw](pools.LANES, random)
         pool = Round(scene, kernels)
-        for lane, start in enumerate(starts):
-            pool.fill(lane, *start)
-        right, hits, _ = pool.step(len(starts))
+        pool.fill_all(starts)
+        right, hits, rows = pool.step(len(starts))
         for i in np.flatnonzero(right):
-            code, _ = pool.careful(*starts[i])
+            (t, _, *place), wall = starts[i]
+            start = State(float(t), *map(float, place), WALL_NAMES[wall])
+            proved = reference.next_collision(scene, start, start.t + 10.0, digits=25)
+            found = "base" if pool.is_disk and rows[i, 2] < 0.0 else WALL_NAMES[int(hits[i])]
             tally["answered"] += 1
-            # What the careful step cannot decide, or refuses, it cannot contradict.
-            tally["wrong"] += code < records.HORIZON and code != hits[i]
+            tally["wrong"] += isinstance(proved, reference.Collision) and proved.wall != found
+        if tally["wrong"]:
+            break
     return tally["wrong"]
 
 
 @pytest.mark.parametrize("draw", CORNERS)
 def test_a_hit_near_a_corner_is_on_the_right_side_of_it(draw, tally):
     """Where Newton's step leads, and not only where it begins."""
-    assert count_wrong_corners(draw, lanes, 40, tally) == 0
-    assert tally["answered"] > 300
+    assert count_wrong_walls(draw, lanes, 20, tally) == 0
+    assert tally["answered"] > 300 or "resting" in draw  # there lanes refuse nearly all
 
 
-@pytest.mark.parametrize("draw", CORNERS)
-def test_without_slack_hits_are_beyond_corners(draw, tally):
-    assert count_wrong_corners(draw, faulty_lanes(*NO_SLACK), 6, tally) > 0
-
-
-def count_wrong_chords(kernels, n_scenes, tally):
-    random = np.random.default_rng(7)
-    for _ in range(n_scenes):
-        scene, starts = at_the_end_of_a_chord(pools.LANES, random)
-        pool = Round(scene, kernels)
-        for lane, start in enumerate(starts):
-            pool.fill(lane, *start)
-        right, _, rows = pool.step(len(starts))
-        for i in np.flatnonzero(right):
-            t, _, *numbers = starts[i][0].tolist()
-            proved = reference.next_collision(scene, State(t, *numbers, wall="arc"), t + 10.0, digits=25)
-            tally["answered"] += 1
-            tally["wrong"] += proved.wall != ("base" if rows[i, 2] < 0.0 else "arc")
-    return tally["wrong"]
-
-
-def test_a_chord_ends_on_the_right_side_of_the_base(tally):
-    """The careful step leaves those open; the proof has them."""
-    assert count_wrong_chords(lanes, 12, tally) == 0
-    assert tally["answered"] > 50
-
-
-def test_without_slack_a_chord_ends_beyond_the_base(tally):
-    assert count_wrong_chords(faulty_lanes(*NO_SLACK), 6, tally) > 0
-
-
-@pytest.mark.parametrize("draw", TIES)
-def test_no_tie_within_rounding_is_answered_wrongly(draw, tally):
-    assert count_wrong_walls(draw, lanes, tally) == 0
+NO_SLACK = ("return slack if error < s else 0.0", "return 0.0")
+# Terms of rounding, and a draw of corners that misses each.
+ROUNDING = {
+    "the mouth's edge": (
+        "a resting mouth's edge",
+        "doubt = fma(SAFETY * rise, fma(size + abs(x), rise, (abs(vx) + rate_w) * depth), doubt)",
+        "doubt = doubt + 0.0",
+    ),
+    "the height at the end": (
+        "the end of a resting arc",
+        "place -= fma(abs(vy), fma(SAFETY, s, slack), SAFETY * abs(y))",
+        "place -= 0.0",
+    ),
+    "the base inside the arc": (
+        "the end of a resting arc",
+        "inside = fma(-SAFETY, fma(abs(vx), s, limits.size + abs(x)), r - abs(x_s))",
+        "inside = r - abs(x_s)",
+    ),
+    "walls that are not met": (
+        "a resting floor's corner",
+        "blur)\n    return fma(fma(limits.lean, abs(outset.vy), abs(outset.vx)) + limits.rate, slack, far)",
+        "0.0)\n    return far",
+    ),
+    "the slack of a hit of the arc": ("the end of the arc", *NO_SLACK),
+    "the slack of a hit of a side": ("the edge of the mouth", *NO_SLACK),
+    "the slack of a chord": ("the end of a chord", *NO_SLACK),
+}
 
 
 @pytest.mark.parametrize("name", ROUNDING)
-def test_the_ties_kill(name, tally):
-    draw, old, new = ROUNDING[name]
-    assert count_wrong_walls(draw, faulty_lanes(old, new), tally) > 0
+def test_without_a_term_of_rounding_hits_are_beyond_corners(name, tally):
+    draw, *change = ROUNDING[name]
+    assert count_wrong_walls(draw, faulty_lanes(*change), 40, tally) > 0

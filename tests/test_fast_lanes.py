@@ -28,7 +28,7 @@ from fast.pieces import PARABOLA, SERIES
 from fast.starts import initial_states
 from fast.step import WALL_CODES
 from fast.units import compile_scene
-from scene import BangBang, Cap, Fourier, State, load
+from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, load
 
 N_STEPS = int(os.environ.get("MUSHROOMS_LANE_STEPS", "20000"))
 PATH = 2000  # collisions
@@ -81,6 +81,7 @@ def moving_cap(**laws):
 
 
 DECAYING = tuple(0.3 * (-1) ** k / k**2 for k in range(1, 17))
+DEEP_SIZE = Fourier(1.0, 1.0, (0.9, 0.0, -0.25))
 SCENES = {
     name: load(name)
     for name in ("moving-cap", "ergodic", "frozen-mushroom", "breathing-circle", "fermi-ulam")
@@ -93,6 +94,15 @@ SCENES |= {
     "sixteen harmonics": moving_cap(r=Fourier(1.0, 1.0, (), DECAYING), h=Fourier(1.0, 1.0, DECAYING)),
     "deep waves": moving_cap(
         r=Fourier(1.0, 1.0, (0.9, 0.0, -0.35)), h=1.0, nu=Fourier(0.5, 1.0, (0.45, 0.0, -0.17)), slope=0.001
+    ),
+    "a deep mouth": Mushroom(r=1.0, h=1.0, nu=Fourier(0.5, 1.0, (0.4, 0.0, -0.125))),
+    "a deep cap": Cap(r=Fourier(1.0, 1.0, (0.8, 0.0, -0.2))),
+    "a deeper cap": Cap(r=Fourier(1.0, 1.0, (0.8, 0.0, -0.25))),
+    "a deep stem": Stem(w=DEEP_SIZE, h=DEEP_SIZE),
+    "waves and knots": Mushroom(
+        r=Fourier(1.5, cos=(0.3,), period=1.0),
+        h=BangBang(((0.0, 2.0), (0.3, 1.0), (0.5, 1.0), (1.0, 2.0))),
+        nu=Fourier(0.5, sin=(0.2,), period=1.0),
     ),
     "a moving slope": moving_cap(slope=Fourier(0.05, 1.0, (0.03,), (0.02,))),
     "a radius with knots": moving_cap(
@@ -173,6 +183,7 @@ def test_lanes_take_the_careful_steps(name, tally):
     assert worst <= BOUND
     assert tally["delicate"] < 0.01 * tally["steps"]
     run = fast.simulate(scene, n_particles=4, energy=1e5)  # paths go the same way
+    assert (run.outcome == 0).all()
     assert run.n_careful.sum() < 0.02 * run.n_collisions.sum()
 
 

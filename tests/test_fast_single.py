@@ -1,4 +1,4 @@
-"""One question of the fast stepper: one call of compiled code, the same answer as by separate checks."""
+"""One question of the fast stepper: one call of compiled code, the same answer as a path of one collision."""
 
 from __future__ import annotations
 
@@ -12,10 +12,8 @@ import pytest
 
 import fast
 from fast import step as stepper
-from fast.batch import followed_paths
 from fast.kernel import records
 from fast.kernel.single import REFUSED
-from fast.units import LateTime, outward
 from scene import (
     BadInput,
     Cap,
@@ -27,9 +25,8 @@ from scene import (
     Rejected,
     Scene,
     State,
-    Undecided,
     load,
-)
+)  # fmt: skip
 from scene.states import check_numbers
 
 NAMES = ("moving-cap", "fixed-cap-clockwise", "fermi-ulam", "frozen-mushroom", "ergodic")
@@ -47,28 +44,14 @@ FIELDS = ("t", "x", "y", "vx", "vy")
 Question = tuple[Scene, State, float]
 
 
-def by_separate_checks(scene: Scene, state: State, t_end: float) -> Outcome:
-    """Answer as `next_collision`, with checks and units in Python and the careful step of trajectories."""
+def by_a_path(scene: Scene, state: State, t_end: float) -> Outcome | None:
+    """Answer as `next_collision`, with checks in Python and the careful step of trajectories."""
     try:
         check_numbers(scene, state, t_end)
-        start = stepper.fitted_start(scene, state)
-        rows, walls = stepper.as_arrays([start])
-        paths = followed_paths(start.compiled, rows, walls, 1, start.units.horizon(t_end))
-        code = paths.codes.item()
-    except LateTime as error:
-        return Undecided(str(error))
+        path = fast.trajectory(scene, state, 1, t_end)
     except BadInput as error:
         return Rejected(str(error))
-    try:
-        if code in stepper.WALL_NAMES:
-            return Collision(
-                stepper.WALL_NAMES[code], *outward(paths.steps[0, 0], start.units.of_step()).tolist()
-            )
-        if code == records.HORIZON:
-            return Horizon(t_end, *outward(paths.ends[0, 2:], start.units.of_step()[2:]).tolist())
-    except BadInput as error:  # the answer does not fit into binary64
-        return Undecided(str(error))
-    return stepper.trouble(code, scene, state)
+    return Collision(path.walls[0], *path.steps[0].tolist()) if path.walls else path.outcome
 
 
 def questions(seed: int, n: int) -> Iterator[Question]:
@@ -93,17 +76,34 @@ def questions(seed: int, n: int) -> Iterator[Question]:
 
 
 def differing(seed: int, n: int) -> list[Question]:
-    """Return the questions that are answered otherwise than by separate checks; nan counts as itself."""
-    return [q for q in questions(seed, n) if repr(fast.next_collision(*q)) != repr(by_separate_checks(*q))]
+    """Return the questions that are answered otherwise than by a path; nan counts as itself."""
+    return [q for q in questions(seed, n) if repr(fast.next_collision(*q)) != repr(by_a_path(*q))]
 
 
-def test_one_call_answers_as_separate_checks_do(tally):
+def test_one_call_answers_as_a_path_does(tally):
     assert differing(1, 1500) == []
     for question in questions(1, 1500):
         tally[type(fast.next_collision(*question)).__name__] += 1
     assert tally["Collision"] > 300
     assert tally["Rejected"] > 500
     assert tally["Horizon"] > 50
+
+
+@pytest.mark.parametrize("exponent", [-900, -950])
+def test_a_path_loses_no_bit_that_one_question_keeps(exponent, tally):
+    """Products bring the first table's steps back, and ldexp the second's: their units are beyond 2^-1000."""
+    random = np.random.default_rng(4)
+    for _ in range(60):
+        angle, shrink = float(random.uniform(0.1, 3.0)), int(random.integers(20, 1065 + exponent))
+        along, across = np.ldexp([math.cos(angle), math.sin(angle)], [exponent, exponent - shrink])
+        state = State(0.0, 0.0, math.ldexp(0.5, exponent - shrink), float(along), float(across))
+        question = Cap(r=2.0**exponent), state, 1e300
+        alone = fast.next_collision(*question)
+        assert by_a_path(*question) == alone
+        assert isinstance(alone, Collision) or "beyond binary64" in alone.reason
+        tally[type(alone).__name__] += 1
+    assert tally["Collision"] > 5
+    assert tally["Undecided"] > 5
 
 
 def test_a_kernel_that_overlooks_the_wall_is_found(monkeypatch):
@@ -129,7 +129,7 @@ def test_a_horizon_of_zero_is_no_late_one(monkeypatch):
         assert fast.trajectory(scene, state, 1, 0.0).outcome == expected
     latest = np.finfo(np.float64).max
     monkeypatch.setattr(stepper.Units, "horizon", lambda units, t_end: t_end or latest)
-    assert by_separate_checks(*small, 0.0) != fast.next_collision(*small, 0.0)
+    assert by_a_path(*small, 0.0) != fast.next_collision(*small, 0.0)
 
 
 def test_scenes_that_come_and_go_are_not_mistaken(monkeypatch):

@@ -1,7 +1,7 @@
 """What the reference answers is known from closed forms, and by the law of reflection in plain mpmath.
 
 Nothing here compares the reference with its own earlier results. Each faulty reference fails this battery.
-Further answers: test_hard_cases_steps.
+Further answers: test_hard_cases.
 """
 
 import math

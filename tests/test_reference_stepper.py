@@ -82,7 +82,7 @@ def test_a_tie_at_an_irrational_time_stays_undecided():
     ],
 )
 def test_bad_states_are_rejected(stepper, scene, state, words):
-    """Beside those of the corpus (test_hard_cases_steps): beyond a wall by a rounding, or on it."""
+    """Beside those of the corpus (test_hard_cases): beyond a wall by a rounding, or on it."""
     outcome = stepper.next_collision(scene, state, 9.0)
     assert isinstance(outcome, Rejected)
     assert re.search(words, outcome.reason)

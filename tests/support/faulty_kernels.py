@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 from types import FunctionType, ModuleType
+from typing import Any
 
 import numpy as np
 from numba.core.dispatcher import Dispatcher
@@ -20,18 +22,16 @@ from support.from_python import from_python
 HOUSE = Path(fast.__file__).parent.parent
 
 
-def output_of(folder: Path, program: str, file: str = "", old: str = "", new: str = "") -> str:
-    """Run a program on a copy of the fast stepper in which `old` stands no more in `file`.
+def value_of(folder: Path, module: str, expression: str, file: str = "", old: str = "", new: str = "") -> Any:
+    """Evaluate an expression on a copy of the fast stepper in which `old` stands no more in `file`.
 
     Args:
         folder: an empty folder for the copy.
-        program: Python source.
+        module: a test module whose names the expression uses.
+        expression: Python source, of a value that JSON holds.
         file: a file of fast/kernel/; none to run the honest kernels in the same manner.
         old: its text to replace, found exactly once.
         new: what to put there.
-
-    Returns:
-        What the program printed.
     """
     shutil.copytree(HOUSE / "fast", folder / "fast", ignore=shutil.ignore_patterns("__pycache__"))
     if file:
@@ -41,10 +41,11 @@ def output_of(folder: Path, program: str, file: str = "", old: str = "", new: st
     paths = [str(folder), str(HOUSE), str(HOUSE / "tests")]
     # Not compiled: for some steps that takes longer than the steps themselves, and the bits are the same.
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(paths)}
+    program = f"import json\nfrom {module} import *\nprint(json.dumps({expression}))"
     command = [sys.executable, "-W", "ignore", "-c", program]
     done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    return json.loads(done.stdout)
 
 
 def faulty_lanes(*changes: str) -> ModuleType:

@@ -2,35 +2,36 @@
 
 `misled chord` and `misled side` solve for a flight whose f has two or three roots close together, and for
 which Newton's method from the lane's guess lands on the second or third of them. `corner over a rising floor`
-starts on a side so near the floor that its f is computed as 0. The last four are
-drawn in lane_rounding.
+starts on a side so near the floor that its f is computed as 0. The other answers hang on a rounding that as a
+rule goes unnoticed:
+
+How long a hop is depends on the arc's rate less the particle's, and an error of the one is an error of the
+other. As a rule rounding of the state or the time does as much. It does not where those are small: early,
+when the phase itself is nearly 0, near an axis and nearly along the arc.
+
+A side or the floor hands its rate to a particle that is much slower, rounded as it is where the wall was
+quick, and where it stands nearly still for long no rounding of time or place does as much.
+
+A flight up a deep stem may be a million times as long as the cap is high: what is left of its time moves the
+place of the hit along the path, and no rounding of the start does, which moves it across.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from math import comb
 
 import numpy as np
-import numpy.typing as npt
 from mpmath import fp
 
 from fast.kernel import records
-from scene import Fourier, Mushroom, Scene
+from fast.kernel.records import FloatArray
+from scene import BangBang, Fourier, Law, Mushroom, Scene
 from scene.laws import value
-from support.lane_rounding import early_hop, slow_beside_a_plateau, up_a_deep_stem
+from support.lane_anywhere import Group, Start
 
-Array = npt.NDArray[np.floating[Any]]
-Start = tuple[Array, int]
 N_CROWD = 4_000
 REACH = 0.24  # phase
-
-
-class Trap(NamedTuple):
-    """How to draw a scene and starts, and whether particles move unfolded through the base."""
-
-    draw: Callable[[int, np.random.Generator], tuple[Scene, list[Start]]]
-    is_captured: bool = False
 
 
 def corner_over_a_rising_floor(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
@@ -50,7 +51,7 @@ def corner_over_a_rising_floor(n: int, random: np.random.Generator) -> tuple[Sce
     return scene, starts
 
 
-def zero_between(off: Callable[[Array], Array], low: Array, high: Array) -> Array:
+def zero_between(off: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:
     """Return zeros of many functions by bisection, nan where the ends have one sign or off jumps."""
     below = off(low)
     ok = below * off(high) < 0.0
@@ -76,15 +77,15 @@ def misled_chord(n: int, random: np.random.Generator) -> tuple[Scene, list[Start
     u_1, n_steps = REACH * random.uniform(0.3, 0.8, N_CROWD), int(random.integers(1, 3))
     r, rate, bend = mean - np.cos(t), np.sin(t), np.cos(t)
 
-    def grown(u: Array) -> Array:  # (r(t + u)^2 - r(t)^2) / u
+    def grown(u: FloatArray) -> FloatArray:  # (r(t + u)^2 - r(t)^2) / u
         d = np.cos(t) - np.cos(t + u)
         return np.asarray(d * (2.0 * r + d) / u)
 
-    def motion(u_3: Array) -> tuple[Array, Array]:
+    def motion(u_3: FloatArray) -> tuple[FloatArray, FloatArray]:
         v2 = (grown(u_3) - grown(u_1)) / (u_3 - u_1)
         return v2, 0.5 * (grown(u_1) - v2 * u_1)
 
-    def missed(u_3: Array) -> Array:
+    def missed(u_3: FloatArray) -> FloatArray:
         v2, q = motion(u_3)
         s = 2.0 * (r * rate - q) / (v2 - rate**2 - r * bend)
         for _ in range(n_steps):
@@ -121,10 +122,10 @@ def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]
     nu = Fourier(0.5, 1.0, (float(0.5 * other * np.cos(phi)),), (float(-0.5 * other * np.sin(phi)),))
     t, n_steps = np.pi - 0.5 * phi + random.uniform(-0.2, 0.1, N_CROWD), int(random.integers(1, 4))
 
-    def w(u: Array | float) -> Array:
+    def w(u: FloatArray | float) -> FloatArray:
         return np.asarray(0.5 * (1.0 + swing * np.cos(t + u)) * (1.0 + other * np.cos(t + u + phi)))
 
-    def rate(u: Array | float) -> Array:
+    def rate(u: FloatArray | float) -> FloatArray:
         one, two = t + u, t + u + phi
         return np.asarray(
             -0.5 * swing * np.sin(one) * (1.0 + other * np.cos(two))
@@ -134,11 +135,11 @@ def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]
     bend = -0.5 * (swing * np.cos(t) + other * np.cos(t + phi) + 2.0 * swing * other * np.cos(2.0 * t + phi))
     u_1 = REACH * random.uniform(0.2, 0.9, N_CROWD)
 
-    def motion(u_2: Array) -> tuple[Array, Array]:
+    def motion(u_2: FloatArray) -> tuple[FloatArray, FloatArray]:
         v = (w(u_2) - w(u_1)) / (u_2 - u_1)
         return v, w(u_1) - v * u_1
 
-    def missed(u_2: Array) -> Array:
+    def missed(u_2: FloatArray) -> FloatArray:
         v, x = motion(u_2)
         s = (w(0.0) - x) / (v - rate(0.0))
         s = s * (1.0 + 0.5 * bend * s / (v - rate(0.0)))
@@ -159,12 +160,78 @@ def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]
     return scene, starts
 
 
-TRAPS = {
-    "corner over a rising floor": Trap(corner_over_a_rising_floor),
-    "misled chord": Trap(misled_chord, is_captured=True),
-    "misled side": Trap(misled_side),
-    "early hop": Trap(early_hop),
-    "early hop through the base": Trap(early_hop, is_captured=True),
-    "up a deep stem": Trap(up_a_deep_stem),
-    "slow beside a plateau": Trap(slow_beside_a_plateau),
+def early_hop(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """Draw starts on the arc near t = 0, near an axis, with a velocity nearly along it."""
+    r = _radius(random)
+    return Mushroom(r=r, w=1e-3, h=0.1), [_start(r, random) for _ in range(n)]
+
+
+def _radius(random: np.random.Generator) -> Law:
+    swing = float(10.0 ** random.uniform(-2, -0.1))
+    if random.random() < 0.3:
+        inner = float(random.uniform(0.2, 0.8))
+        return BangBang(((0.0, 1.0), (inner, 1.0 - swing), (1.0, 1.0)))
+    cos = (swing,) if random.random() < 0.5 else (0.7 * swing, -0.3 * swing)
+    sin = (0.0,) if random.random() < 0.5 else (float(0.1 * swing * 10.0 ** random.uniform(-9, 0)),)
+    return Fourier(1.0, 1.0, cos, sin)
+
+
+def _start(r: Law, random: np.random.Generator) -> Start:
+    t = 0.0 if random.random() < 0.3 else float(10.0 ** random.uniform(-12, 0))
+    now, rate = float(value(fp, r, t)), float(value(fp, r, t, 1))
+    off = 0.0 if random.random() < 0.3 else float(10.0 ** random.uniform(-12, 0))
+    angle = 0.5 * np.pi - off if random.random() < 0.8 else off + 1e-3
+    along = float(random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-1, 3))
+    out = rate - abs(along) * 10.0 ** random.uniform(-9, -0.3)
+    e_x, e_y = float(np.cos(angle)) if off else 0.0, float(np.sin(angle))
+    place = (now * e_x, now * e_y, out * e_x - along * e_y, out * e_y + along * e_x)
+    return np.array([t, 0.0, *place]), int(records.ARC)
+
+
+def up_a_deep_stem(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """Draw starts on the floor of a deep stem, through the mouth to the arc."""
+    depth, swing = float(10.0 ** random.uniform(2, 6)), float(random.choice([0.0, 0.3]))
+    scene = Mushroom(r=Fourier(1.0, 1.0, (swing,)), nu=0.95, h=depth)
+    starts = []
+    for _ in range(n):
+        t, speed = float(random.uniform(0, 9)), float(depth * 10.0 ** random.uniform(1, 4))
+        width = 0.95 * (1.0 - swing)
+        x, at_mouth = random.uniform(-width, width, 2)
+        state = np.array([t, 0.0, x, -depth, speed * (at_mouth - x) / depth, speed])
+        starts.append((state, int(records.FLOOR)))
+    return scene, starts
+
+
+def slow_beside_a_plateau(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """Draw short slow flights to a floor or a side that stands nearly still, and is quick at other times."""
+    law, is_floor, starts = _plateau(int(random.integers(2, 9))), random.random() < 0.5, []
+    scene = Mushroom(r=3.0, w=1.0, h=law) if is_floor else Mushroom(r=3.0, w=law, h=1.0)
+    for _ in range(n):
+        t = float(2.0 * np.pi * random.integers(0, 5) + random.uniform(-0.4, 0.2))
+        speed, along = 10.0 ** random.uniform(-4, -1.5), random.random()
+        s = speed * 10.0 ** random.uniform(-3, -1)
+        there, rate = float(value(fp, law, t + s)), float(value(fp, law, t + s, 1))
+        if is_floor:
+            place, wall = (1.0, (speed + rate) * s - there, -speed * along, -speed - rate), records.RIGHT
+        else:
+            place, wall = (there - (speed + rate) * s, -1.0, speed + rate, speed * along), records.FLOOR
+        starts.append((np.array([t, 0.0, *place]), int(wall)))
+    return scene, starts
+
+
+def _plateau(n: int) -> Fourier:
+    """Return 1 + 0.4 ((1 - cos t) / 2)^n, flat about t = 0."""
+    shares = [0.4 * comb(2 * n, n - k) / 4.0**n for k in range(n + 1)]
+    waves = tuple(2.0 * (-1) ** k * share for k, share in enumerate(shares))
+    return Fourier(1.0 + shares[0], 1.0, waves[1:])
+
+
+TRAPS: dict[str, Group] = {
+    "corner over a rising floor": Group(corner_over_a_rising_floor),
+    "misled chord": Group(misled_chord, is_captured=True),
+    "misled side": Group(misled_side),
+    "early hop": Group(early_hop),
+    "early hop through the base": Group(early_hop, is_captured=True),
+    "up a deep stem": Group(up_a_deep_stem),
+    "slow beside a plateau": Group(slow_beside_a_plateau),
 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import random
 from fractions import Fraction
@@ -161,11 +160,3 @@ def test_products_known_to_be_positive_need_no_proof(monkeypatch):
     nu = Fourier(0.5, cos=(0.5 - 2.0**-40,), period=1.0)
     r = BangBang(((0.0, 1.0), (0.5, 5e-324), (1.0, 1.0)))
     assert Mushroom(r=r, nu=nu, h=1.0).nu == nu
-
-
-def test_conditions_of_one_kind_stay_exact():
-    """Touching is allowed where no condition mixes kinds: nu = 1 at an instant, beside legs of h."""
-    legs = BangBang(((0.0, 1.0), (0.5, 2.0), (1.0, 1.0)))
-    assert Mushroom(r=1.0, h=legs, nu=Fourier(0.75, cos=(0.25,), period=1.0))
-    with pytest.raises(InvalidScene, match="nu <= 1 fails"):
-        Mushroom(r=1.0, h=legs, nu=Fourier(0.75, cos=(math.nextafter(0.25, 1.0),), period=1.0))

@@ -27,7 +27,7 @@ from scene import (
     validity,
 )
 from scene.geometry import area, half_width, rounded, table_at
-from scene.laws import bounds, breakpoints, exact, is_constant, shared_period, value
+from scene.laws import bounds, breakpoints, exact, shared_period, value
 from scene.tables import laws as laws_of
 from scene.tables import period
 
@@ -52,6 +52,7 @@ def wave(mean, amplitude):
 
 
 LEGS = BangBang(knots=((0.0, 1.0), (0.5, 0.5), (1.0, 1.0)))
+TOUCHING = Fourier(mean=1 - 0.0625 - 0.125, omega=1.0, cos=(0.25, -0.125))
 
 
 @pytest.mark.parametrize(
@@ -74,6 +75,14 @@ LEGS = BangBang(knots=((0.0, 1.0), (0.5, 0.5), (1.0, 1.0)))
         (mushroom, {"nu": None, "w": LEGS, "r": DOWN}, False),
         # w and r touch twice, at different phases of the same period.
         (mushroom, {"nu": None, "r": Fourier(mean=1.0, omega=1.0, cos=(0.25,)), "w": wave(0.5, -0.25)}, True),
+        # 1 - nu = (1/2 - cos t)^2 / 4: touches at t = +-pi/3, where no sampling would land.
+        (mushroom, {"nu": TOUCHING}, True),
+        (mushroom, {"nu": replace(TOUCHING, mean=math.nextafter(TOUCHING.mean, 1.0))}, False),
+        # No condition mixes kinds, so that nu may touch 1 beside legs of h.
+        (mushroom, {"h": LEGS, "nu": Fourier(0.75, cos=(0.25,), period=1.0)}, True),
+        (mushroom, {"h": LEGS, "nu": Fourier(0.75, cos=(math.nextafter(0.25, 1.0),), period=1.0)}, False),
+        # A law that stands still needs no common period.
+        (mushroom, {"r": Fourier(mean=1.0, omega=3.0, cos=(0.0,)), "h": LEGS}, True),
         (mushroom, {"slope": 0.5}, False),
         (mushroom, {"slope": math.nextafter(0.5, 0.0)}, True),
         (mushroom, {"slope": -4.0}, True),
@@ -96,15 +105,6 @@ def test_contact_is_decided_exactly(make, laws, expected):
     assert is_valid(make, **laws) == expected
 
 
-def test_a_double_contact_inside_the_period_is_decided():
-    # 1 - nu = (1/2 - cos t)^2 / 4: touches at t = +-pi/3, where no sampling would land.
-    touching = Fourier(mean=1 - 0.0625 - 0.125, omega=1.0, cos=(0.25, -0.125))
-    assert is_valid(mushroom, nu=touching)
-    above = Fourier(mean=math.nextafter(touching.mean, 1.0), omega=1.0, cos=touching.cos)
-    assert not is_valid(mushroom, nu=above)
-
-
-margins = st.integers(-64, 64).map(lambda n: n / 256)
 clocks = st.sampled_from([Clock("fourier", 1.0), Clock("bang-bang", 2.0)])
 
 
@@ -276,12 +276,6 @@ def test_the_message_says_how_laws_come_to_share_a_period(r, h, message):
         mushroom(r=r, h=h)
     assert "must share one period exactly" in str(refusal.value)
     assert len(str(refusal.value).splitlines()) == 1
-
-
-def test_a_law_that_stands_still_needs_no_common_period():
-    still = Fourier(mean=1.0, omega=3.0, cos=(0.0,))
-    assert is_constant(still)
-    assert mushroom(r=still, h=LEGS)
 
 
 WAVE = Fourier(0.2, 1.5, (0.05,), (0.02,))

@@ -87,6 +87,14 @@ ILL_FORMED = [
 IMPOSSIBLE = [
     ({"table": "mushroom", "r": 1.0, "h": 1.0}, "exactly one of `w` and `nu`"),
     ({**MUSHROOM, "w": 0.5}, "exactly one of `w` and `nu`"),
+    (
+        {**MUSHROOM, "nu": 1.0 + 2.0**-52},
+        "nu <= 1 fails by -2.22045e-16 near t = 0.0, where r = 1.0, nu = 1.0",
+    ),
+    (
+        {"table": "mushroom", "r": 1.0, "h": 1.0, "w": {**LEGS, "knots": [[0, 0.5], [1, 1.5], [2, 0.5]]}},
+        "w <= r fails by -0.5",
+    ),
     ({**CAP, "r": math.nan}, "r = nan, must be finite"),
     ({**CAP, "r": -math.inf}, "r = -inf, must be finite"),
     ({**CAP, "r": 10**400}, "r = an integer of 1329 bits"),

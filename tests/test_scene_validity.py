@@ -26,7 +26,7 @@ from scene import (
     to_data,
     validity,
 )
-from scene.geometry import area, half_width, rounded, table_at
+from scene.geometry import area, rounded, table_at
 from scene.laws import bounds, breakpoints, exact, shared_period, value
 from scene.tables import laws as laws_of
 from scene.tables import period
@@ -344,10 +344,3 @@ def test_points_of_the_stem_are_uniform_in_its_area(scene):
     x, depth = now.uniform_in_stem(a, b)
     assert depth * (2 * now.w - now.slope * depth) == pytest.approx(a * now.stem_area())
     assert x / now.half_width(-depth) == pytest.approx(2 * b - 1)
-
-
-def test_a_relative_mouth_moves_by_the_product_rule():
-    scene, t = SCENES[2], 0.7
-    (r, r_rate), (nu, nu_rate) = ([value(fp, law, t, k) for k in (0, 1)] for law in (scene.r, scene.nu))
-    assert half_width(fp, scene, t) == r * nu
-    assert half_width(fp, scene, t, 1) == pytest.approx(nu_rate * r + nu * r_rate)

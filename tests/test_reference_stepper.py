@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 import re
-import threading
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 
 import mpmath
@@ -130,21 +130,13 @@ def test_trajectory_ends_at_its_horizon_and_at_corners():
 
 
 def test_threads_at_different_digits_do_not_disturb_each_other():
-    state = State(0.0, 0.1, 0.3, 10.0, 7.0)
-    alone = {d: hit(load("moving-cap"), state, digits=d).dt for d in (10, 80)}
-    found: dict[int, list[object]] = {10: [], 80: []}
+    def flight_time(digits):
+        return hit(load("moving-cap"), State(0.0, 0.1, 0.3, 10.0, 7.0), digits=digits).dt
 
-    def work(digits):
-        for _ in range(6):
-            found[digits].append(hit(load("moving-cap"), state, digits=digits).dt)
-
+    alone = [flight_time(digits) for digits in (10, 80)]
     before = mpmath.mp.prec, mpmath.iv.prec
-    threads = [threading.Thread(target=work, args=(d,)) for d in found]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert all(dt == alone[d] for d, results in found.items() for dt in results)
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(flight_time, [10, 80] * 6)) == alone * 6
     assert (mpmath.mp.prec, mpmath.iv.prec) == before
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 import re
-import threading
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 
 import mpmath
@@ -13,17 +13,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
-from support.tables import CIRCLE, STATIC
+from support.tables import BOX, CIRCLE, STATIC
 from support.truth import IS_DEEP
 
 import fast
 import reference
 from conformance.strategies import scenes_and_states
-from reference.arithmetic import Arithmetic, sign
-from reference.isolation import Isolator
-from reference.jets import Jet
 from reference.rational import law_jet
-from reference.start import motion_at
 from scene import (
     BadInput,
     BangBang,
@@ -134,21 +130,13 @@ def test_trajectory_ends_at_its_horizon_and_at_corners():
 
 
 def test_threads_at_different_digits_do_not_disturb_each_other():
-    state = State(0.0, 0.1, 0.3, 10.0, 7.0)
-    alone = {d: hit(load("moving-cap"), state, digits=d).dt for d in (10, 80)}
-    found: dict[int, list[object]] = {10: [], 80: []}
+    def flight_time(digits):
+        return hit(load("moving-cap"), State(0.0, 0.1, 0.3, 10.0, 7.0), digits=digits).dt
 
-    def work(digits):
-        for _ in range(6):
-            found[digits].append(hit(load("moving-cap"), state, digits=digits).dt)
-
+    alone = [flight_time(digits) for digits in (10, 80)]
     before = mpmath.mp.prec, mpmath.iv.prec
-    threads = [threading.Thread(target=work, args=(d,)) for d in found]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert all(dt == alone[d] for d, results in found.items() for dt in results)
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(flight_time, [10, 80] * 6)) == alone * 6
     assert (mpmath.mp.prec, mpmath.iv.prec) == before
 
 
@@ -166,61 +154,6 @@ def test_the_bound_on_work_leaves_room_for_ten_thousand_digits():
 def test_a_table_whose_square_overflows():
     state = State(0.0, 0.6e200, 0.8e200, -1.0, -1.0, "arc")
     assert reference.next_collision(Cap(r=1e200), state, 1e300).wall == "base"
-
-
-class TestIsolation:
-    """The isolator on functions whose roots are known."""
-
-    def first(self, jet, end=4.0, start=0.0):
-        arithmetic = Arithmetic(30)
-        isolator = Isolator(arithmetic, jet, arithmetic.zero)
-        return isolator.first_root(arithmetic.number(start), arithmetic.number(end))
-
-    @pytest.mark.parametrize("least", [1e-3, 1e-9, 1e-15])
-    def test_a_near_miss_is_no_hit(self, least):
-        """F = (s - 1)^2 + least has no root, however close."""
-        arithmetic = Arithmetic(30)
-
-        def parabola(s):
-            d = s - 1
-            return Jet(arithmetic.square(d) + arithmetic.number(least), 2 * d, arithmetic.number(2))
-
-        assert self.first(parabola) is None
-
-    def test_a_double_root_is_not_decided(self):
-        arithmetic = Arithmetic(30)
-        third = arithmetic.number(Fraction(1, 3))
-
-        def parabola(s):
-            return Jet(arithmetic.square(s - third), 2 * (s - third), arithmetic.number(2))
-
-        with pytest.raises(reference.arithmetic.Undecidable):
-            self.first(parabola)
-
-
-@settings(max_examples=100)
-@given(scenes_and_states(), st.floats(0, 1), st.floats(0, 1))
-def test_wall_functions_enclose_plain_values(drawn, a, b):
-    """f, f', f'' over an interval contain the value and differences at points of it."""
-    scene, state, t_end = drawn
-    arithmetic = Arithmetic(40)
-    motion = motion_at(scene, state, arithmetic)
-    span = t_end - state.t
-    lo, hi = sorted((a * span, b * span))
-    whole = arithmetic.context.mpf([lo, hi])
-    for wall in scene.walls:
-        jet = motion.wall(wall, whole)
-        inner = motion.wall(wall, arithmetic.number(lo + (hi - lo) / 3))
-        for outer, point in zip(jet, inner, strict=True):
-            if outer is None:
-                assert point is None
-            elif point is not None:
-                assert outer.a <= point.b
-                assert point.a <= outer.b
-        if hi > lo and jet.d1 is not None:
-            # Mean value: f(hi) - f(lo) lies in f'(I) (hi - lo).
-            ends = motion.wall(wall, arithmetic.number(hi)).f - motion.wall(wall, arithmetic.number(lo)).f
-            assert sign(ends - jet.d1 * (arithmetic.number(hi) - arithmetic.number(lo))) == 0
 
 
 def test_few_digits_refuse_no_start_on_its_wall():
@@ -314,6 +247,51 @@ def test_what_another_wall_does_after_a_hit_leaves_the_hit_decided():
     assert far.dt.contains(0.25)
     slow = replace(state, vy=-0.0001)
     assert isinstance(reference.next_collision(scene, slow, 1e6), Undecided)
+
+
+MARGINS = {
+    # From the middle with v = (1, 1/4): right at s = 1, base at s = 2, 1/4 below it.
+    "a box": (
+        BOX,
+        State(0, 0.0, -0.5, 1.0, 0.25),
+        {"gap": Fraction(1), "corner": Fraction(1, 4), "slope": Fraction(1)},
+    ),
+    # Along y the sides are never met, and the base lies behind.
+    "alone in sight": (BOX, State(0, 0.25, -0.5, 0.0, -1.0), {"gap": None, "corner": 0.75}),
+    "the sides of a mushroom ignore the arc": (
+        STATIC,
+        State(0, 0.0, -0.5, 1.0, 0.0),
+        {"corner": 0.5},
+    ),
+}
+
+
+def margins_of(scene, state):
+    return reference.next_collision(scene, state, 100.0, digits=30, is_measured=True).margins
+
+
+@pytest.mark.parametrize("name", MARGINS)
+def test_margins_by_hand(name):
+    """Gap to the wall met next, distance to the nearest corner, speed of approach."""
+    scene, state, expected = MARGINS[name]
+    found = margins_of(scene, state)
+    for field, number in expected.items():
+        margin = getattr(found, field)
+        assert margin is None if number is None else margin.contains(number)
+
+
+@pytest.mark.parametrize("near", [1e-3, 1e-9])
+def test_margins_near_the_corner_of_arc_and_base(near):
+    """Falling steeply beside the corner: the base is met, then at once the arc."""
+    found = margins_of(CIRCLE, State(0, 0.5, 0.5, 0.5, -0.5 - near))
+    assert float(found.corner) == pytest.approx(near, rel=0.02)
+    assert 0 < float(found.gap) < 5 * near
+
+
+def test_margins_at_the_arc_of_the_moving_cap_before_the_base():
+    found = margins_of(load("moving-cap"), State(0.1, 0.9, 0.2, 3.0, -0.5))
+    assert found.gap is not None
+    assert 0 < float(found.corner) < 0.2
 
 
 FACTORS = st.lists(st.integers(-2, 2), min_size=1, max_size=6).map(tuple)

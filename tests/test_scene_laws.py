@@ -43,6 +43,13 @@ def test_a_fourier_law_is_its_sum():
     assert value(fp, law, t) == pytest.approx(expected, rel=1e-15)
 
 
+def test_frequency_of_a_period_is_the_nearest_number():
+    ctx = context(50)
+    law = Fourier(1.0, period=3.0, cos=(0.5,))
+    assert abs(frequency(ctx, law) * 3 - 2 * ctx.pi) < ctx.mpf(10) ** -48
+    assert float(frequency(ctx, Fourier(1.0, 0.1, (0.5,)))) == 0.1
+
+
 @pytest.mark.parametrize(("time", "level"), [(0.0, 1.0), (0.25, 0.3), (0.5, 0.3), (0.75, 1.0), (1.0, 1.0)])
 def test_bang_bang_rests_at_its_knots(time, level):
     ctx = context(40)
@@ -204,14 +211,29 @@ def test_a_broken_law_cannot_be_made(make, message):
     assert message in one_line(make)
 
 
-def test_numbers_of_any_kind_become_floats_and_lists_tuples():
-    law = Fourier(1, np.float32(2.0), [np.float64(0.25), 0], [Fraction(1, 8)])
+@pytest.mark.parametrize(
+    "given",
+    [
+        (1, np.float32(2.0), [np.float64(0.25), 0], [Fraction(1, 8)]),
+        (np.array(1.0), np.float32(2.0), np.array([0.25, 0.0]), [np.array(0.125)]),
+    ],
+)
+def test_numbers_of_any_kind_become_floats_and_lists_tuples(given):
+    law = Fourier(*given)
     assert law == Fourier(1.0, 2.0, (0.25, 0.0), (0.125,))
     assert {type(x) for x in (law.mean, law.omega, *law.cos, *law.sin)} == {float}
-    legs = BangBang([[0, 1], [np.int64(1), np.float64(2)], (2, 1)])
+    assert {type(x) for x in (law.cos, law.sin)} == {tuple}
+
+
+KNOTS = [[0, 1], [np.int64(1), np.float64(2)], (2, 1)]
+
+
+@pytest.mark.parametrize("given", [KNOTS, np.array(KNOTS), [np.array(knot) for knot in KNOTS]])
+def test_knots_of_any_kind_become_floats_and_tuples(given):
+    legs = BangBang(given)
     assert legs == BangBang(((0.0, 1.0), (1.0, 2.0), (2.0, 1.0)))
     assert {type(x) for knot in legs.knots for x in knot} == {float}
-    assert {type(x) for x in (law.cos, law.sin, legs.knots, *legs.knots)} == {tuple}
+    assert {type(x) for x in (legs.knots, *legs.knots)} == {tuple}
 
 
 @pytest.mark.parametrize(
@@ -228,10 +250,6 @@ def test_a_law_is_evaluated_at_a_time_or_an_array_of_times(law, period):
         assert one_line(law, bad).startswith(words)
 
 
-def test_what_numpy_holds_is_taken_as_lists_are():
-    law = Fourier(np.array(1.0), np.float32(2.0), np.array([0.25, 0.0]), [np.array(0.125)])
-    assert law == Fourier(1.0, 2.0, (0.25, 0.0), (0.125,))
-    knots = [[0, 1.0], [1, 2.0], [2, 1.0]]
-    assert BangBang(np.array(knots)) == BangBang([np.array(knot) for knot in knots]) == BangBang(knots)
+def test_sizes_of_numpy_become_floats():
     table = Stem(w=np.array(1.0), h=np.float32(2.0))
     assert (table, type(table.w)) == (Stem(w=1.0, h=2.0), float)

@@ -7,7 +7,6 @@ import sys
 
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 from support import fuzz
 from support.schemas import validator
 
@@ -40,21 +39,15 @@ def inline(value):
 
 
 @given(scenes())
-def test_data_round_trips_to_the_bit(scene):
-    data = to_data(scene)
-    assert from_data(data) == scene
-    again = json.loads(json.dumps(data))
-    assert from_data(again) == scene
-    assert json.dumps(to_data(from_data(again))) == json.dumps(data)
-
-
-@given(scenes())
-def test_files_round_trip_to_the_bit(tmp_path_factory, scene):
+def test_data_and_files_round_trip_to_the_bit(tmp_path_factory, scene):
     folder = tmp_path_factory.mktemp("scenes")
-    data = to_data(scene)
-    (folder / "a.json").write_bytes(line := json.dumps(data).encode())
+    line = json.dumps(to_data(scene)).encode()
+    (folder / "a.json").write_bytes(line)
     (folder / "a.toml").write_bytes(as_toml(line))
-    assert load(folder / "a.json") == load(str(folder / "a.toml")) == scene
+    for again in (from_data(to_data(scene)), load(folder / "a.json"), load(str(folder / "a.toml"))):
+        assert again == scene
+        assert json.dumps(to_data(again)).encode() == line
+    validator("scene").validate(json.loads(line))
 
 
 def test_whole_numbers_are_numbers():
@@ -74,6 +67,7 @@ ILL_FORMED = [
     ({"table": "stem", "w": 1.0}, "missing required field `h`"),
     ({**CAP, "radius": 1.0}, "unknown field `radius`"),
     ({**CAP, "w": 1.0}, "unknown field `w`"),
+    ({**CAP, "k" * 100_000: 1.0}, "kkk...`, must be one of"),
     ({**CAP, "line\nbreak": 1.0}, "unknown field `line break`"),
     ({**STEM, "nu": 0.5}, "unknown field `nu`"),
     ({**CAP, "r": "1.0"}, "r = '1.0': must be a number or a law"),
@@ -93,6 +87,14 @@ ILL_FORMED = [
 IMPOSSIBLE = [
     ({"table": "mushroom", "r": 1.0, "h": 1.0}, "exactly one of `w` and `nu`"),
     ({**MUSHROOM, "w": 0.5}, "exactly one of `w` and `nu`"),
+    (
+        {**MUSHROOM, "nu": 1.0 + 2.0**-52},
+        "nu <= 1 fails by -2.22045e-16 near t = 0.0, where r = 1.0, nu = 1.0",
+    ),
+    (
+        {"table": "mushroom", "r": 1.0, "h": 1.0, "w": {**LEGS, "knots": [[0, 0.5], [1, 1.5], [2, 0.5]]}},
+        "w <= r fails by -0.5",
+    ),
     ({**CAP, "r": math.nan}, "r = nan, must be finite"),
     ({**CAP, "r": -math.inf}, "r = -inf, must be finite"),
     ({**CAP, "r": 10**400}, "r = an integer of 1329 bits"),
@@ -119,7 +121,9 @@ def refusal(call, *arguments):
 
 @pytest.mark.parametrize(("data", "message"), ILL_FORMED + IMPOSSIBLE)
 def test_bad_data_is_refused_in_one_line_that_names_the_field(data, message):
-    assert message in refusal(from_data, data)
+    found = refusal(from_data, data)
+    assert message in found
+    assert len(found) < 300
 
 
 BAD_FILES = [
@@ -167,14 +171,7 @@ def test_what_may_have_no_end_is_not_read(tmp_path):
     os.mkfifo(tmp_path / "pipe.toml")
     (tmp_path / "zero.json").symlink_to("/dev/zero")
     for name in ("pipe.toml", "zero.json"):
-        with pytest.raises(InvalidScene, match=rf"{name}' cannot be read: it is a pipe or a device"):
-            load(tmp_path / name)
-
-
-def test_a_key_of_any_length_is_refused_in_a_short_line():
-    with pytest.raises(InvalidScene, match=r"unknown field `k+\.\.\.`, must be one of") as refusal:
-        from_data({**CAP, "k" * 100_000: 1.0})
-    assert len(str(refusal.value)) < 300
+        assert f"{name}' cannot be read: it is a pipe or a device" in refusal(load, tmp_path / name)
 
 
 def test_files_that_cannot_be_read(tmp_path):
@@ -184,24 +181,6 @@ def test_files_that_cannot_be_read(tmp_path):
     assert "nor one of" in refusal(load, "moving-cup")
     assert "nor one of" in refusal(load, "")
     assert "a.toml" in refusal(load, "nul\0a.toml")
-
-
-junk = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=4),
-    max_leaves=12,
-)
-
-
-@given(st.sampled_from([CAP, STEM, MUSHROOM]), st.sampled_from(["r", "w", "h", "nu", "slope", "table"]), junk)
-def test_junk_is_refused_or_loads_but_never_crashes(data, field, entry):
-    refusal, scene = "one line", None
-    try:
-        scene = from_data({**data, field: entry})
-    except InvalidScene as error:
-        refusal = str(error)
-    assert len(refusal.splitlines()) == 1
-    assert scene is None or from_data(to_data(scene)) == scene
 
 
 @pytest.mark.parametrize("suffix", [".json", ".toml"])
@@ -230,11 +209,6 @@ def test_a_law_nested_too_deep_is_refused():
 @pytest.mark.parametrize("name", catalogue())
 def test_the_schema_accepts_the_catalogue(name):
     validator("scene").validate(read_data(name))
-
-
-@given(scenes())
-def test_the_schema_accepts_every_scene(scene):
-    validator("scene").validate(json.loads(json.dumps(to_data(scene))))
 
 
 @pytest.mark.parametrize(("data", "_"), ILL_FORMED)

@@ -2,42 +2,29 @@
 
 from __future__ import annotations
 
-from itertools import pairwise, zip_longest
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from mpmath import fp
 from support.depth import deep_among
 
 from scene import BangBang, Cap, Fourier, Mushroom, Stem, load
 from scene import mouth as module
+from scene.laws import values
 from scene.mouth import mouth_minima
+from scene.tables import period
 
 N_SAMPLES = 1 << 13
 ROUNDING = 2.0**-42
 
 
-def sampled(law, start, phases):
-    """Return a law at phases of the cycle; written anew, in plain floats."""
-    if isinstance(law, Fourier):
-        period = law.period or 2 * np.pi / law.omega
-        angle = 2 * np.pi * ((start / period) % 1 + phases)
-        waves = ((k + 1, c, s) for k, (c, s) in enumerate(zip_longest(law.cos, law.sin, fillvalue=0.0)))
-        return law.mean + sum(c * np.cos(k * angle) + s * np.sin(k * angle) for k, c, s in waves)
-    if isinstance(law, BangBang):
-        times, values = np.array(law.knots).T
-        span = times[-1] - times[0]
-        t = times[0] + (start + span * phases - times[0]) % span
-        i = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
-        x = (t - times[i]) / (times[i + 1] - times[i])
-        return values[i] + (values[i + 1] - values[i]) * np.where(x < 0.5, 2 * x**2, 1 - 2 * (1 - x) ** 2)
-    return np.full_like(phases, law)
-
-
 def mouth(scene, phases):
+    """Return nu at phases of the cycle, which begins with the first knot, or at time 0."""
     start = next((law.knots[0][0] for law in (scene.r, scene.w, scene.nu) if isinstance(law, BangBang)), 0.0)
-    if scene.nu is not None:
-        return sampled(scene.nu, start, phases)
-    return sampled(scene.w, start, phases) / sampled(scene.r, start, phases)
+    shared = period(scene)
+    times = start + (float(shared.value(fp)) if shared else 1.0) * phases
+    return values(scene.nu, times) if scene.w is None else values(scene.w, times) / values(scene.r, times)
 
 
 def fault(scene, found, n_samples=N_SAMPLES):

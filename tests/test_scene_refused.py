@@ -86,20 +86,6 @@ def test_bad_input_is_refused_by_name(bads, begin, call):
         assert ("1 to 9" in line) == (begin == "n = "), bad
 
 
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (
-            lambda: Mushroom(r=1.0, h=1.0, nu=math.nextafter(1.0, 2.0)),
-            "nu <= 1 fails by -2.22045e-16 near t = 0.0, where r = 1.0, nu = 1.0",
-        ),
-        (lambda: Mushroom(r=1.0, h=1.0, w=BangBang(((0, 0.5), (1, 1.5), (2, 0.5)))), "w <= r fails by -0.5"),
-    ],
-)
-def test_scenes_that_cannot_exist(make, words):
-    assert words in one_line(make)
-
-
 WAYS = {
     "constructor": lambda field, bad: Cap(**{"r": 1.0, field: bad}),
     "structs.replace": lambda field, bad: msgspec.structs.replace(CIRCLE, **{field: bad}),
@@ -192,7 +178,6 @@ def test_a_zero_keeps_its_sign():
 def test_check_count():
     assert check_count("n", np.int64(9), 1, 9) == 9
     assert type(check_count("n", np.int64(9), 1, 9)) is int
-    assert one_line(check_count, "n", 10, 1, 9) == "n = 10, must be 1 to 9"
     assert one_line(check_count, "n", 10**5000, 1, 9) == "n = an integer of 16610 bits, must be 1 to 9"
 
 

@@ -1,9 +1,11 @@
 """Certified answers, from the one prover, and how delicate a question is."""
 
 import os
+from fractions import Fraction
 from typing import Any
 
 from msgspec import to_builtins
+from msgspec.structs import replace
 
 import reference
 import scene as scenes
@@ -15,11 +17,29 @@ from scene import Scene, State
 from scene.laws import bounds
 from scene.tables import laws
 
-__all__ = ["IS_DEEP", "centre", "certified_answer", "is_delicate", "proved_step"]
+__all__ = ["IS_DEEP", "centre", "certified_answer", "is_delicate", "jacobian_error", "proved_step"]
 
 IS_DEEP = os.environ.get("HYPOTHESIS_PROFILE") == "deep"
 NUDGE = 2.0**-46  # what rounding may move a state by, relative to the table and to the speed
 centre = Enclosure.centre
+INPUTS = ("t", "x", "y", "vx", "vy")
+
+
+def jacobian_error(scene: Scene, start: State, walls: list[str]) -> float:
+    """Return how far a path's Jacobian is from differences, as a share of its largest entry."""
+    n = len(walls)
+    path = reference.trajectory(scene, start, n, is_differentiated=True)
+    assert [step.wall for step in path.steps] == walls
+    h, worst = 2.0**-40, 0.0
+    largest = max(abs(float(d)) for row in path.jacobian for d in row)
+    for column, field in enumerate(INPUTS):
+        starts = [replace(start, **{field: getattr(start, field) + d}) for d in (h, -h)]
+        ends = [reference.trajectory(scene, s, n).steps[-1].after for s in starts]
+        step = Fraction(getattr(starts[0], field)) - Fraction(getattr(starts[1], field))
+        for row, (plus, minus) in zip(path.jacobian, zip(*ends, strict=True), strict=True):
+            difference = float((centre(plus) - centre(minus)) / step)
+            worst = max(worst, abs(float(row[column]) - difference) / largest)
+    return worst
 
 
 def is_delicate(scene: Scene, state: State, t_end: float) -> bool:

@@ -50,10 +50,10 @@ it](protocol.md#the-last-line)). Up to three kinds of line say why a stepper is 
 
 - *Fails most in*: the groups with the most failures, and their number.
 - *Failures by kind*: `fail` counts the wrong answers that fit none of the other kinds.
-- *Like a mutant*: a [mutant](glossary.md#mutant) is a stepper with one known mistake. It is asked up to 20 of the
-  questions that failed and up to 20 of those that passed. The line says how many of the former it fails too, and how
-  many of the latter it fails. A stepper that fails most questions resembles every mutant that fails most questions.
-  Then the line says little about the cause.
+- *Like a mutant*: a [mutant](glossary.md#mutant) is a stepper with one known mistake. It is asked up to 20
+  of the questions that failed and up to 20 of those that passed. The line says how many of the former it
+  fails too, and how many of the latter it fails. A stepper that fails most questions resembles every mutant
+  that fails most questions. Then the line says little about the cause.
 
 | stepper | verdict | pass | fail | other | A/B/C | seconds |
 | --- | --- | ---: | ---: | ---: | ---: | ---: |

@@ -18,7 +18,8 @@ LANGUAGES = (".py", ".c", ".h", ".cpp", ".hpp", ".js", ".css")
 MAX_FUNCTION = 60  # lines of a function, its decorators and docstring included
 # Files, and functions by `file: name`, that may be longer, and why.
 LONGER = {"conformance/verify.py": "one file that anyone can read and run, without installing anything"}
-# Statements of a folder's Python files (nodes of `ast.stmt`), without docstrings: a bound rises for a new capability only.
+# Statements of a folder's Python files (nodes of `ast.stmt`), without docstrings: a bound rises for a new
+# capability only.
 MAX_STATEMENTS = {
     "scene": 1_536,
     "reference": 1_454,

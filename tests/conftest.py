@@ -36,6 +36,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 # end. While one worker compiles for test_fast_bits.py, the next ones have nothing to compile.
 LONGEST = [
     "test_fast_bits.py",
+    "test_fast_faulty_kernels.py",
     "test_theory_prediction.py",
     "test_theory_valleys.py",
     "test_mushrooms_audit.py",

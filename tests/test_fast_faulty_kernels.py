@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from support.depth import deep_but
 from support.faulty_kernels import value_of
 
 ELSEWHERE = (
@@ -71,11 +72,13 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("name", FAULTS)
+# Each compiles a copy of the kernels, tens of seconds.
+@pytest.mark.parametrize("name", deep_but(FAULTS, "sides are looked for below the floor"))
 def test_a_changed_line_is_found(name, tmp_path):
     assert value_of(tmp_path, *FAULTS[name])
 
 
+@pytest.mark.deep
 def test_the_same_copy_without_a_fault_is_right(tmp_path):
     assert (
         value_of(tmp_path, "test_fast_horizons", "fast.next_collision(WAVING, MISSED, 50.0).wall") == "floor"

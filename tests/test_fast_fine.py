@@ -6,6 +6,7 @@ import os
 from fractions import Fraction
 from math import hypot
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -24,7 +25,7 @@ from fast.kernel.fine_step import fine_path
 from fast.kernel.records import ANCHORS_SHAPE
 from fast.step import WALL_CODES
 from fast.units import compile_scene
-from scene import Collision, Mushroom, State, Stem, Undecided, load
+from scene import BangBang, Cap, Collision, Mushroom, State, Stem, Undecided, load
 from scene.geometry import table_at
 from scene.tables import period
 
@@ -109,6 +110,20 @@ def test_generated_steps_are_right_to_31_decimals(tally):
     assert np.median(units) <= 1.0
     assert np.quantile(units, 0.9) <= SHARP
     assert len(units) > N_STEPS // 3
+
+
+SPIKE = ((0.765625, 0.9259033203125), (1.0, 1.6240234375), (1.0009765625, 0.60888671875))
+# The law's knots are periods away from the time, and beside both the hop is short.
+EARLY = Cap(r=BangBang(knots=(*SPIKE, (1.265625, 0.9259033203125))))
+OFF_THE_KNOT = State(0.0, -1.6240234374527343, 1.2390362797987107e-05, 0.000264, 10.287379856, "arc")
+
+
+@pytest.mark.parametrize("periods", [0, 2, -3, 40])
+def test_a_short_hop_periods_away_from_the_knots_keeps_its_decimals(periods):
+    state = msgspec.structs.replace(OFF_THE_KNOT, t=0.5 * periods)
+    truth, path = proved_step(EARLY, state, 50.0, digits=60), fast.fine_trajectory(EARLY, state, 1)
+    dt, _, *place = path.numbers(0)
+    assert compare(enclosed(path.walls[0], [dt, *place]), truth, state, SHARP / UNIT).kind == "agrees"
 
 
 def test_the_bound_tells_pairs_from_binary64():

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from fast.kernel.arithmetic import add, div, fine_sine_cosine, mul, sub, times, two_sum
+from fast.kernel.arithmetic import add, div, fine_sine_cosine, mul, sub, times
 from fast.kernel.compiling import kept, kernel
-from fast.kernel.laws import leg_at, set_anchors, time_since
+from fast.kernel.laws import leg_at, set_anchors
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, ARC, BANG_BANG, BASE, BEYOND, DEPTH, FAR_TIME, FLOOR, FOURIER, HORIZON, KIND, KNOTS, LEVEL,
@@ -56,15 +56,23 @@ def phase(laws, row, k, t):
 
 
 @kernel
+def time_after(laws, row, i, n_periods, t):
+    """Return the time since a knot of a bang-bang law, so many periods on.
+
+    Knot and periods are added first: t may be short beside both.
+    """
+    periods = times(n_periods, (laws[row, PERIOD], laws[row, PERIOD_LOW]))
+    return sub(t, add((laws[row, KNOTS + i], 0.0), periods))
+
+
+@kernel
 def half_leg_at(laws, row, t):
     """Return where in a bang-bang law a time lies: half-leg, periods gone by, time from the nearer knot."""
     i, n_periods = leg_at(laws, row, t[0], t[1])
-    before, after = laws[row, KNOTS + i], laws[row, KNOTS + i + 1]
-    period, period_low = laws[row, PERIOD], laws[row, PERIOD_LOW]
-    u = time_since(before, n_periods, period, period_low, t[0], t[1])
-    if sub(u, times(0.5, two_sum(after, -before)))[0] < 0.0:
+    u, rest = time_after(laws, row, i, n_periods, t), time_after(laws, row, i + 1, n_periods, t)
+    if add(u, rest)[0] < 0.0:
         return 2 * i, n_periods, u
-    return 2 * i + 1, n_periods, time_since(after, n_periods, period, period_low, t[0], t[1])
+    return 2 * i + 1, n_periods, rest
 
 
 @kernel

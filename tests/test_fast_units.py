@@ -45,7 +45,8 @@ def answers(scene, state, t_end):
     for found, dt in ((step, 0.0), (path.outcome, 0.0), (run.outcomes[0], run.t_in[0])):
         if isinstance(found, Rejected):
             raise BadInput(found.reason)
-        words += [type(found).__name__, getattr(found, "wall", None), getattr(found, "reason", None)]
+        reason = getattr(found, "reason", "").replace(repr(state.t), "t")  # the only number that scales in it
+        words += [type(found).__name__, getattr(found, "wall", None), reason]
         if isinstance(found, Collision | Horizon):
             rows.append([getattr(found, "dt", dt), found.t, found.x, found.y, found.vx, found.vy])
     return words, np.array(rows)

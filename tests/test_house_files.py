@@ -23,11 +23,11 @@ LONGER = {"conformance/verify.py": "one file that anyone can read and run, witho
 MAX_STATEMENTS = {
     "scene": 1_536,
     "reference": 1_454,
-    "fast": 3_674,
+    "fast": 3_675,
     "theory": 2_239,
     "conformance": 8_720,
     "mushrooms": 3_716,
-    "tests": 13_128,
+    "tests": 13_139,
     "docs": 110,
     ".ci": 40,
 }

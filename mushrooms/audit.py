@@ -113,6 +113,7 @@ def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -
     if settings.resume:
         wanted = {claim.id for claim in claims} | session.kept(settings)
         claims = tuple(claim for claim in all_claims() if claim.id in wanted)
+        _check_report(folder, wanted)
     check_runs(folder, needed(claims, settings.size), settings.seed, settings.resume)
     try:
         with announce_compilation(), progress_bar() as bar:
@@ -126,6 +127,20 @@ def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -
     except KeyboardInterrupt as error:
         error.add_note("finished parts are in the folder of the report: --resume continues the audit")
         raise
+
+
+def _check_report(folder: Path, wanted: set[str]) -> None:
+    """Refuse to replace a report by one that has fewer claims, as other settings would."""
+    try:
+        report = json.loads((folder / "report.json").read_text("utf-8"))
+        there = {finding["id"] for finding in report["findings"]}
+    except (OSError, ValueError, KeyError, TypeError):  # there is no report that could be lost
+        return
+    if there - wanted:
+        raise BadInput(
+            f"output {str(folder)!r} has a report of {len(there)} claims, size = {report.get('size')!r} and"
+            f" seed = {report.get('seed')}; {len(wanted)} are asked for: with --resume none is given up"
+        )
 
 
 def _watch_runs(bar: progress.Progress) -> Callable[[str, int, int], None]:

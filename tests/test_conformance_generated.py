@@ -1,7 +1,7 @@
 """Questions of one run: exact images of vectors, and questions in scenes that no file holds.
 
 Right steppers pass them. A stepper that is right in the corpus alone does not, nor one that knows the corpus
-by heart, whether or not it knows the seed. Steppers that are wrong where chance seldom looks are found out: a
+by heart, whether or not it knows the seed. Steppers whose mistakes show in rare inputs are refused: a
 family of questions draws what they get wrong on purpose, of steps as of trajectories and flows. (One that
 follows these by an engine of its own may be right in steps.) Each is a method of the plain stepper overridden
 by a function, as `conformance.mutants` are; some are mutants of another size.

@@ -26,8 +26,8 @@ MAX_STATEMENTS = {
     "fast": 3_675,
     "theory": 2_239,
     "conformance": 8_720,
-    "mushrooms": 3_716,
-    "tests": 13_139,
+    "mushrooms": 3_724,
+    "tests": 13_144,
     "docs": 110,
     ".ci": 40,
 }

@@ -264,11 +264,17 @@ def test_sources_are_looked_at_before_anything_is_examined(tmp_path, monkeypatch
 
 @pytest.mark.deep
 def test_resumed_with_other_claims_a_report_has_both(call, tmp_path, blocks):
+    """Never fewer: what other settings would leave out is not given up."""
     for ids, wanted in (("X5,N6", "X5,N6"), ("M10", "M10,X5,N6"), ("N6", "M10,X5,N6")):
         done = call("--only", ids, "--out", tmp_path, "--resume", "--json")
         assert done.code == 0
         assert [finding["id"] for finding in json.loads(done.out)["findings"]] == wanted.split(",")
     assert len(blocks) == 6
+    before = (tmp_path / "report.json").read_bytes()
+    for more in (["--seed", 1], ["--full"]):
+        done = call("--only", "N6", "--out", tmp_path, "--resume", *more)
+        assert_refused(done, "a report of 3 claims", "seed = 0; 1 are asked for")
+    assert (tmp_path / "report.json").read_bytes() == before
 
 
 def test_one_audit_or_run_holds_a_folder(call, command_line, tmp_path):

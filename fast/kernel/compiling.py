@@ -174,6 +174,7 @@ def _compiled_widest_registers(_context: Any) -> Any:
     def generate(context: Any, builder: ir.IRBuilder, _: Any, __: Any) -> Any:
         # llvmlite's own `add` knows none of the attributes that are strings.
         set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+        # Registers that are put aside cross no cache line then, wherever the caller's stack ends.
         builder.function.attributes.alignstack = 64
         return context.get_dummy_value()
 
@@ -185,5 +186,6 @@ def _no_registers() -> None:
 
 
 # Asks, in the function that calls it, for the widest registers there are: left to itself the compiler takes
-# 256 bits on machines that have 512. The answers are the same bits.
+# 256 bits on machines that have 512. The answers are the same bits. A loop is packed by itself and again
+# where it is inlined, which keeps only the outer function's attributes: both ask.
 widest_registers = _no_registers if config.DISABLE_JIT else _compiled_widest_registers

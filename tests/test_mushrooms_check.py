@@ -304,28 +304,6 @@ def test_json_is_what_the_verifier_takes(rows, tmp_path, command_line):
     assert (code, out.splitlines()[-1]) == (0, "4 of 4 proved")
 
 
-@pytest.mark.parametrize(
-    ("content", "options", "message"),
-    [
-        ("{", [], "Expecting"),
-        ("{}", [], "scene"),
-        ('{"scene": {"table": "cap", "r": 1.0}, "steps": [], "steps": []}', [], "a key comes twice"),
-        ("t,x,y,vx,vy\n0,0,0,1,1", [], "needs --scene"),
-        ("t,x,y,vx\n0,0,0,1", ["--scene", "moving-cap"], "column 'vy' is missing"),
-        (
-            "t,x,y,vx,vy\n0,0,0,1,up",
-            ["--scene", "moving-cap"],
-            "steps.csv':2: vy = 'up', must be a finite number",
-        ),
-    ],
-)
-def test_a_bad_trajectory_is_refused_in_one_line(content, options, message, tmp_path, command_line):
-    path = tmp_path / ("steps.json" if content[0] == "{" else "steps.csv")
-    path.write_text(content)
-    assert_refused(command_line("verify", path, *options), message)
-    assert_refused(command_line("verify", tmp_path / "none.json"), "none.json': No such file")
-
-
 ROOT = Path(__file__).parent.parent
 FILES = ["bench.html", "bench.json", "bench.svg"]
 

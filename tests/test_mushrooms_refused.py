@@ -73,6 +73,7 @@ STEPPER = shlex.join([sys.executable, str(Path(conformance.__file__).parent / "h
 ONE = "simulate moving-cap --particles 5 --energy 1"
 STORED = "simulate moving-cap --particles 5 --energy 100 --out out"
 PLOT = "simulate moving-cap --particles 60 --energy 1e4 --plot"
+BENCH = Path(__file__).parent.parent / "docs" / "bench" / "bench.json"
 SEEDS = "0 to 18446744073709551615"
 NOTHING = "would change nothing here"
 AUDIT = "audit --scene moving-cap --out report --ensemble"
@@ -149,7 +150,8 @@ REFUSED: list[Any] = [
     ("theory moving-cap-as-printed", ["w > h slope"]),
     ("theory fermi-ulam", []),
     ("simulate moving-cap --energy 1", ["--particles"]),
-    ("scenes --toml", ["--toml needs NAME"]),
+    ("scenes --toml", ["--toml needs NAME", "moving-cap"]),
+    ("scenes nowhere", ["moving-cap"]),
     ("audit --only X2,X99", ["X99", "M1", "L7"]),
     *(
         (f"audit --only '{ids}'", ["--only ", why])
@@ -163,6 +165,7 @@ REFUSED: list[Any] = [
     ("bench --quick -- ./no-such-stepper", ["no-such-stepper"]),
     pytest.param((f"bench --quick -- {sys.executable} -c 'print(1)'", ["python"]), marks=pytest.mark.deep),
     ("bench --table absent.json", ["absent.json"]),
+    (f"bench --table {BENCH} --workload nowhere", ["workload = 'nowhere'", "moving-cap-1e7"]),
     ("check", ["COMMAND"]),
     ("check -- ./no-such-stepper", ["no-such-stepper"]),
     ("check --level hard -- true", ["level = 'hard'", "core, extended, stress"]),

@@ -195,13 +195,12 @@ def to_data(result: EnsembleAudit, path: Path, scene_name: str) -> dict[str, Any
 def to_html(data: dict[str, Any], given: GivenEnsemble) -> str:
     """Return the page."""
     gain = given.s[:: 1 + (len(given.s) - 1) // MOST_DRAWN]
-    first = svg(energies.histogram(given.scene, given.energy, gain))
     times = capture_times(given)
     return render(
         "ensemble.html.jinja",
         report=data,
         signs=SIGNS,
-        energies=embed(first),
+        energies=embed(svg(energies.histogram(given.scene, given.energy, gain))),
         times=embed(times) if times else None,
     )
 

@@ -253,7 +253,7 @@ def simulate(
     plot: Plot = None,
     threads: Threads = None,
     as_json: AsJson = False,
-) -> int:
+) -> None:
     """Simulate an ensemble. Undecided particles are counted, never guessed.
 
     Prints: particles; collisions; lost (not followed to the end); undecided (lost because the stepper could
@@ -271,7 +271,7 @@ def simulate(
     """
     from mushrooms.simulate import simulate_scene
 
-    return simulate_scene(
+    simulate_scene(
         scene, particles, energy, cycles, seed, phases, out, resume, dask, block, max_collisions, max_seconds,
         plot, threads, as_json,
     )  # fmt: skip

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import typer
 from rich.progress import Progress
 
 import fast
@@ -78,8 +79,8 @@ def simulate_scene(
     plot: Path | None,
     threads: int | None,
     as_json: bool,
-) -> int:
-    """Simulate an ensemble, in memory or in a folder, and print its summary; return the exit code."""
+) -> None:
+    """Simulate an ensemble, in memory or in a folder, and print its summary."""
     if out is None:
         if particles > MOST_IN_MEMORY:
             raise BadInput(f"--particles = {particles}, must be 1 to {MOST_IN_MEMORY}; more need --out")
@@ -95,19 +96,14 @@ def simulate_scene(
     spec = RunSpec(scene_named(scene), energy, cycles, seed, _phases(phases))
     arguments = CliArgs(scene, spec, particles, threads, dask, block, max_collisions, max_seconds)
     if out is None:
-        found = _in_memory(arguments)
+        summary, gains = _in_memory(arguments)
     else:
         with writable_folder(out) as folder, locked(folder):
-            stored = _on_disk(arguments, folder, resume)
-            if stored is None:
-                return LIMITED
-            found = stored
-    summary, gains = found
+            summary, gains = _on_disk(arguments, folder, resume)
     print_pairs(summary, as_json)
     tell(explain_limit(spec, summary))
     if plot is not None:
         draw_energies(plot, spec, iter(gains()), particles)
-    return 0
 
 
 def _phases(text: str | None) -> tuple[float, ...]:
@@ -140,8 +136,8 @@ def _in_memory(arguments: CliArgs) -> tuple[dict[str, Any], Gains]:
     return summary, lambda: [gains]
 
 
-def _on_disk(arguments: CliArgs, folder: Path, resume: bool) -> tuple[dict[str, Any], Gains] | None:
-    """Bring the run in a folder to its end; return its summary and gains, or None if a limit came first."""
+def _on_disk(arguments: CliArgs, folder: Path, resume: bool) -> tuple[dict[str, Any], Gains]:
+    """Bring the run in a folder to its end, or the command to its own; return its summary and gains."""
     spec, n = arguments.spec, arguments.particles
     command = spec.command(arguments.scene, n, folder)
     default = conduct.block_of_new(spec, n, arguments.n_threads)
@@ -156,7 +152,7 @@ def _on_disk(arguments: CliArgs, folder: Path, resume: bool) -> tuple[dict[str, 
         tell(f"{limit}: {_how_to_resume(run, command)}")
         if run.tally.particles == n_before:  # it would stop there again and again
             tell(f"{NO_BLOCK} than {run.shape.block}")
-        return None
+        raise typer.Exit(LIMITED) from None
     except (KeyboardInterrupt, OSError) as error:  # of a file, or a connection to a cluster
         error.add_note(_how_to_resume(run, command))
         raise

@@ -43,6 +43,7 @@ LONGEST = [
     "test_mushrooms_audit.py",
     "test_mushrooms_main.py",
     "test_mushrooms_store.py",
+    "test_mushrooms_refused.py",
     "test_fast_lane_search.py",
     "test_mushrooms_check.py",
     "test_conformance_checks.py",

@@ -159,23 +159,34 @@ def test_one_name_means_one_class():
     assert repeated_classes(texts()) == {}
 
 
-def test_planted_lengths_and_names_are_seen():
-    body = "    pass\n"
-    assert long_files({"fast/a.py": body * 701, "fast/b.py": body * 700}) == ["fast/a.py"]
-    long = "@decorated\n" + "def f():\n" + body * 59
-    right = "class A:\n    async def g(self):\n" + "        pass\n" * 59
-    assert long_functions({"fast/a.py": long, "tests/b.py": right}) == ["fast/a.py: f"]
-    assert long_functions({"tests/b.py": right + "        pass\n"}) == ["tests/b.py: g"]
-    most = {f"{folder}/a.py": '"""Doc."""' + "\nx" * n for folder, n in MAX_STATEMENTS.items()}
-    assert large_folders(most) == {}
-    more = {**most, "scene/b.py": "if x: y", "new/c.py": "x"}
-    assert large_folders(more) == {"scene": MAX_STATEMENTS["scene"] + 2, "new": 1}
-    crowded = "def f(a, b, c, d, e, f, g, h, i): pass\ndef g(a, b, c, d, e, f, g, h): pass"
-    assert crowded_kernels({"fast/kernel/a.py": crowded, "fast/b.py": crowded}) == ["fast/kernel/a.py: f"]
-    ours = {"fast/a.py": "class Run: pass", "scene/b.py": "def f():\n    class Run: pass"}
-    assert repeated_classes(ours) == {"Run": ["fast/a.py", "scene/b.py"]}
-    theirs = {"tests/c.py": "class Run: pass", COMPLETE[0] + "python/d.py": "class Run: pass"}
-    assert repeated_classes({"fast/a.py": "class Run: pass", **theirs}) == {}
+BODY = "    pass\n"
+LONG = "@decorated\n" + "def f():\n" + BODY * 59
+METHOD = "class A:\n    async def g(self):\n" + "        pass\n" * 59
+MOST = {f"{folder}/a.py": '"""Doc."""' + "\nx" * n for folder, n in MAX_STATEMENTS.items()}
+CROWD = "def f(a, b, c, d, e, f, g, h, i): pass\ndef g(a, b, c, d, e, f, g, h): pass"
+OURS = {"fast/a.py": "class Run: pass", "scene/b.py": "def f():\n    class Run: pass"}
+THEIRS = {"tests/c.py": "class Run: pass", COMPLETE[0] + "python/d.py": "class Run: pass"}
+
+
+@pytest.mark.parametrize(
+    ("checker", "sources", "found"),
+    [
+        (long_files, {"fast/a.py": BODY * 701, "fast/b.py": BODY * 700}, ["fast/a.py"]),
+        (long_functions, {"fast/a.py": LONG, "tests/b.py": METHOD}, ["fast/a.py: f"]),
+        (long_functions, {"tests/b.py": METHOD + "        pass\n"}, ["tests/b.py: g"]),
+        (large_folders, MOST, {}),
+        (
+            large_folders,
+            {**MOST, "scene/b.py": "if x: y", "new/c.py": "x"},
+            {"scene": MAX_STATEMENTS["scene"] + 2, "new": 1},
+        ),
+        (crowded_kernels, {"fast/kernel/a.py": CROWD, "fast/b.py": CROWD}, ["fast/kernel/a.py: f"]),
+        (repeated_classes, OURS, {"Run": ["fast/a.py", "scene/b.py"]}),
+        (repeated_classes, {"fast/a.py": "class Run: pass", **THEIRS}, {}),
+    ],
+)
+def test_planted_lengths_and_names_are_seen(checker, sources, found):
+    assert checker(sources) == found
 
 
 def test_every_dependency_says_why_it_is_there():

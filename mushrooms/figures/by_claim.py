@@ -208,8 +208,13 @@ def losses(sample: Sample) -> Figure:
     figure, axes = new_figure(5.6, 3.6)
     scene, n_cycles = scene_of(sample.run), sample.run.n_cycles
     found = predicted(sample).draw(n_cycles, N_DRAWN // n_cycles, DRAWN_SEED)
-    label = "theory at this energy, drawn"
-    axes.plot(np.arange(1, n_cycles + 1), (found < 0).mean(axis=0), color=BLACK, linewidth=1.3, label=label)
+    axes.plot(
+        np.arange(1, n_cycles + 1),
+        (found < 0).mean(axis=0),
+        color=BLACK,
+        linewidth=1.3,
+        label="theory at this energy, drawn",
+    )
     places = np.unique(np.geomspace(1, n_cycles, 12).astype(int))
     far = np.array([theory.loss_probability(scene, int(k)) for k in places])
     axes.plot(places, far, "s", color=ORANGE, markersize=4, label="theory at infinite energy")
@@ -217,8 +222,12 @@ def losses(sample: Sample) -> Figure:
     slope = far[-1] * np.exp(rate * (n_cycles - late))
     axes.plot(late, slope, ":", color=ORANGE, label=f"exp(-{rate:.4f} n)")
     _points(axes, places, [share(sample.s[:, k - 1] < 0) for k in places])
-    title = f"{sample.run.name}, {sample.n:,} particles"
-    axes.set(yscale="log", xlabel="cycles n", ylabel="P(E_n < E0)", title=title)
+    axes.set(
+        yscale="log",
+        xlabel="cycles n",
+        ylabel="P(E_n < E0)",
+        title=f"{sample.run.name}, {sample.n:,} particles",
+    )
     axes.legend(fontsize=8)
     return figure
 
@@ -301,8 +310,13 @@ def convergence(*samples: Sample) -> Figure:
         panel.set(xscale="log", xlabel="E0", title=label)
     fit = theory.extrapolate(energies, [v.value for v in rows[0][1]], [v.error for v in rows[0][1]])
     x = np.geomspace(energies[0], energies[-1], 200)
-    label = f"{fit.limit:.4f} + {fit.slope:.2f} E0^(-1/2)"
-    axes[0].plot(x, fit.limit + fit.slope * x**-0.5, color=BLACK, linewidth=1, label=label)
+    axes[0].plot(
+        x,
+        fit.limit + fit.slope * x**-0.5,
+        color=BLACK,
+        linewidth=1,
+        label=f"{fit.limit:.4f} + {fit.slope:.2f} E0^(-1/2)",
+    )
     axes[0].legend(fontsize=8)
     return figure
 
@@ -311,16 +325,20 @@ def release(*samples: Sample) -> Figure:
     """Draw nu(t_out) - nu(t_in) against 1/v."""
     figure, axes = new_figure(9.6, 3.4, 1, 2)
     for sample in samples:
-        gap = nu_gap(sample)
-        shown = np.abs(gap[:400])
+        shown = np.abs(nu_gap(sample)[:400])
         place = np.full(len(shown), 1 / sample.speed)
         axes[0].plot(place, shown, ".", color=GREY, markersize=1.5, rasterized=True)
     x = np.array([1 / sample.speed for sample in samples])
     rms = np.array([math.sqrt(np.mean(nu_gap(sample) ** 2)) for sample in samples])
     axes[0].plot(x, rms, "o", color=BLUE, label="root mean square")
     axes[0].plot(x, rms[0] * x / x[0], color=ORANGE, label="slope 1")
-    axes[0].set(xscale="log", yscale="log", ylim=(rms.min() / 100, rms.max() * 100))
-    axes[0].set(xlabel="1/v", ylabel="|nu(t_out) - nu(t_in)|")
+    axes[0].set(
+        xscale="log",
+        yscale="log",
+        ylim=(rms.min() / 100, rms.max() * 100),
+        xlabel="1/v",
+        ylabel="|nu(t_out) - nu(t_in)|",
+    )
     axes[0].legend()
     sample = samples[-1]
     gap = nu_gap(sample) * sample.speed

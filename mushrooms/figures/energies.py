@@ -190,9 +190,8 @@ def _title(scene: Scene, energy: float, bars: Gathered, n_particles: int | None)
 
 def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
     """Draw a histogram, with the limit of high energies if theory covers the scene."""
-    heights = _bars(axes, bars)
-    top = 1.3 * float(heights.max())
-    axes.set(xlabel=AXIS, ylabel="density", xlim=(bars.edges[0], bars.edges[-1]), ylim=(0, top))
+    heights, edges = _bars(axes, bars), bars.edges
+    axes.set(xlabel=AXIS, ylabel="density", xlim=(edges[0], edges[-1]), ylim=(0, 1.3 * float(heights.max())))
     axes.locator_params(axis="x", nbins=6)
     with suppress(*NO_THEORY):
         if isinstance(scene, Mushroom) and begins_widest(scene):
@@ -202,8 +201,15 @@ def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
 def draw_adiabatic(axes: Axes, limit: theory.Energies, edges: FloatArray, name: str) -> None:
     """Draw the energies of the adiabatic theory: a density of the captured, a line for the others."""
     if limit.p_nc < 1:
-        label = f"theory, captured, {name}"
-        _draw_density(axes, limit.captured_below, edges, N_PLACES, color=ORANGE, linewidth=1.4, label=label)
+        _draw_density(
+            axes,
+            limit.captured_below,
+            edges,
+            N_PLACES,
+            color=ORANGE,
+            linewidth=1.4,
+            label=f"theory, captured, {name}",
+        )
     if limit.p_nc > 0:
         draw_never_captured(axes, float(limit.s_nc))
 
@@ -229,9 +235,15 @@ def draw(axes: Axes, rest: Axes | None, bars: Gathered, found: theory.FiniteEner
         axes.set(xlabel=AXIS)
     else:
         _residuals(rest, bars.counts, shares * bars.n, edges)
-    label = f"theory at this energy, peak {found.peak[1] ** 0.5:.4f} wide"
-    n = 4 * N_BARS + 1  # finer, single atoms of the theory would show
-    _draw_density(axes, found.cdf, edges, n, color=BLACK, linewidth=1.3, label=label)
+    _draw_density(
+        axes,
+        found.cdf,
+        edges,
+        4 * N_BARS + 1,  # finer, single atoms of the theory would show
+        color=BLACK,
+        linewidth=1.3,
+        label=f"theory at this energy, peak {found.peak[1] ** 0.5:.4f} wide",
+    )
     top = 1.3 * max(float(heights.max()), float((shares / np.diff(edges)).max()))  # spikes are cut
     axes.set(xlim=(edges[0], edges[-1]), ylim=(0, top), ylabel="density")
 

@@ -54,8 +54,9 @@ def trajectory(orbit: FollowedOrbit) -> Figure:
     states = orbit.states()
     begin, end = float(states[0, 0]), float(states[-1, 0])
     if orbit.scene.period:
-        at_end: dict[str, Any] = {"color": plots.GREY, "linewidth": 1.2, "linestyle": "--"}
-        tables.draw_walls(axes, orbit.scene, end, label="walls at the end", **at_end)
+        tables.draw_walls(
+            axes, orbit.scene, end, color=plots.GREY, linewidth=1.2, linestyle="--", label="walls at the end"
+        )
     tables.draw_walls(axes, orbit.scene, begin, color=plots.BLACK, linewidth=2, label="walls at the start")
     points = states[:, 1:3]
     lines = LineCollection(
@@ -173,8 +174,12 @@ def _draw_stem(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None) 
         return
     has_floor = isinstance(found[0].scene, Stem) and not is_constant(found[0].scene.h)
     wall, name = ("floor", "vy") if has_floor else ("side", "|vx|")
-    label = f"{name} after the hit [length/time]"
-    axes.set(xlim=(0, 1), ylim=(0, None), xlabel=f"phase t/T of the hit of a moving {wall}", ylabel=label)
+    axes.set(
+        xlim=(0, 1),
+        ylim=(0, None),
+        xlabel=f"phase t/T of the hit of a moving {wall}",
+        ylabel=f"{name} after the hit [length/time]",
+    )
 
 
 def _points(
@@ -208,8 +213,7 @@ def draw_map(axes: Axes, found: Sequence[FollowedOrbit]) -> None:
     for slot in boundary(found[0].scene):
         axes.axvline(slot.end, color=plots.BLACK, linewidth=0.8)
         if slot.end - slot.begin > 0:
-            where = ((slot.begin + slot.end) / 2, 1.03)
-            axes.text(*where, slot.wall, ha="center", va="bottom", fontsize=9, transform=axes.transData)
+            axes.text((slot.begin + slot.end) / 2, 1.03, slot.wall, ha="center", va="bottom", fontsize=9)
     axes.set(
         xlim=(0, 1),
         ylim=(-1, 1),
@@ -231,22 +235,43 @@ def energy_in_time(orbit: FollowedOrbit) -> Figure:
     states = orbit.states()
     time = (states[:, 0] - states[0, 0]) / span if span else states[:, 0]
     energies = orbit.energies()
-    one: dict[str, Any] = {"color": plots.BLUE, "linewidth": 0.8, "label": "this particle", "zorder": 3}
-    axes.plot(time, np.log(energies / energies[0]), **one)  # above the theory, a broad line
+    axes.plot(
+        time,
+        np.log(energies / energies[0]),
+        color=plots.BLUE,
+        linewidth=0.8,
+        label="this particle",
+        zorder=3,  # above the theory, a broad line
+    )
     known = "theory with these captures" if isinstance(orbit.scene, Mushroom) else "theory"
     try:
         axes.plot(time, orbit.adiabatic(), color=plots.BLACK, linewidth=2.6, alpha=0.6, label=known)
         if isinstance(orbit.scene, Mushroom):
             free = theory.chaotic_zone(orbit.scene, states[:, 0]).log_energy
-            label = "theory, never captured"
-            axes.plot(time, free - free[0], color=FREE, linestyle="--", linewidth=1.3, label=label)
+            axes.plot(
+                time,
+                free - free[0],
+                color=FREE,
+                linestyle="--",
+                linewidth=1.3,
+                label="theory, never captured",
+            )
     except (theory.NotCovered, theory.NotConverged):
         pass  # no theory of this table: the simulation alone
     captured = orbit.captured()
     if isinstance(orbit.scene, Mushroom) and captured.any():
-        shade: dict[str, Any] = {"color": CAPTURED, "alpha": 0.15, "linewidth": 0, "label": "captured"}
-        across = axes.get_xaxis_transform()
-        axes.fill_between(time, 0, 1, where=captured, step="post", transform=across, **shade)
+        axes.fill_between(
+            time,
+            0,
+            1,
+            where=captured,
+            step="post",
+            transform=axes.get_xaxis_transform(),
+            color=CAPTURED,
+            alpha=0.15,
+            linewidth=0,
+            label="captured",
+        )
     axes.set(xlabel="t / T" if span else "t [time]", ylabel="ln(E/E0)", title=_title([orbit]))
     figure.legend(loc="outside lower center", ncols=2)
     return figure
@@ -303,7 +328,6 @@ def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAM
     def show(k: int) -> None:
         trail.set_data(*np.vstack([states[max(0, last[k] - TRAIL) : last[k] + 1, 1:3], places[k]]).T)
         dot.set_data(*places[k : k + 1].T)
-        title = f"{plots.plain(orbit.scene.name)}   {name} = {(times[k] - times[0]) / unit:.2f}"
-        axes.set_title(title)
+        axes.set_title(f"{plots.plain(orbit.scene.name)}   {name} = {(times[k] - times[0]) / unit:.2f}")
 
     tables.write_frames(orbit.scene, axes, times.tolist(), show, file)

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib import colormaps, rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 FloatArray = npt.NDArray[np.float64]
@@ -40,8 +41,7 @@ STYLE: dict[str, Any] = {
 
 def phase_colours(n: int) -> list[str]:
     """Return n colours in the order of the phases; the palest end of viridis is left out."""
-    shades = colormaps["viridis"](np.linspace(0, 0.88, n))
-    return ["#" + "".join(f"{round(255 * part):02x}" for part in shade[:3]) for shade in shades]
+    return [to_hex(shade) for shade in colormaps["viridis"](np.linspace(0, 0.88, n))]
 
 
 def plain(text: str) -> str:

@@ -182,8 +182,11 @@ def headline(record: Record) -> Figure:
         place, style["ha"] = PLACES.get(p.family, ((9, 0), "left"))
         axes.annotate(name, (_digits_of(p)[0], statistics.median(p.ns)), place, fontsize=LABEL + 1, **style)
     axes.text(BINARY64 * 1.04, 4e7, "binary64", fontsize=LABEL)
-    label = "correct digits of an answer (mark: median; bar: to the worst)"
-    axes.set(xlabel=label, ylabel="ns per collision", title=f"One core, {workload.name}: {workload.what}")
+    axes.set(
+        xlabel="correct digits of an answer (mark: median; bar: to the worst)",
+        ylabel="ns per collision",
+        title=f"One core, {workload.name}: {workload.what}",
+    )
     return figure
 
 
@@ -232,11 +235,17 @@ def growth(found: Growth) -> bytes:
         axes.plot(
             count, shown, color=colour, marker=mark, markevery=every, markersize=5, linewidth=1, label=name
         )
-    label = "one ulp a step, grown"
-    axes.plot(count, found.bound, color=plots.BLACK, linestyle="--", linewidth=1, label=label)
+    axes.plot(
+        count, found.bound, color=plots.BLACK, linestyle="--", linewidth=1, label="one ulp a step, grown"
+    )
     early = count[: 2 * (found.collisions // 3)]
-    label = f"Lyapunov slope: {found.rate:.2f} decimals a collision"
-    axes.plot(early, 10.0 ** (found.rate * (early - 1) - 32), color=plots.GREY, linestyle=":", label=label)
+    axes.plot(
+        early,
+        10.0 ** (found.rate * (early - 1) - 32),
+        color=plots.GREY,
+        linestyle=":",
+        label=f"Lyapunov slope: {found.rate:.2f} decimals a collision",
+    )
     axes.set(yscale="log", xlabel="collisions", ylabel="error, relative to table and speed", ylim=(1e-60, 10))
     axes.legend(loc="lower right")
     return plots.svg(figure)

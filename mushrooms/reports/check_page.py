@@ -178,8 +178,17 @@ def _draw(scene: Scene, state: State, t: float, both: tuple[Steps, Steps], at: i
         draw.draw_walls(axes, scene, t, color=plots.BLACK, linewidth=1, linestyle=":")
         for steps, (colour, width, name) in zip(both, STROKES, strict=True):
             x, y = ([getattr(state, place), *(step[place] for step in steps)] for place in "xy")
-            style = {"marker": ".", "markersize": 3 * width, "linestyle": line, "alpha": 0.75, "label": name}
-            axes.plot(x, y, color=colour, linewidth=width, **style)
+            axes.plot(
+                x,
+                y,
+                color=colour,
+                linewidth=width,
+                marker=".",
+                markersize=3 * width,
+                linestyle=line,
+                alpha=0.75,
+                label=name,
+            )
             for step in steps[at:]:
                 _draw_direction(axes, step, 0.1 * size, color=colour, linewidth=width)
         axes.plot(state.x, state.y, marker="o", color=plots.BLACK, markersize=4, linestyle="none")

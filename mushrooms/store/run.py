@@ -361,12 +361,10 @@ def attributes_of(folder: Path) -> dict[str, Any]:
     content = unsealed(folder / MARKERS / DESCRIPTION)
     if content is not None:
         return dict(json.loads(content))
-    try:
+    with suppress(*UNREADABLE):
         found = dict(zarr.open_group(folder / GROUP, mode="r").attrs)
         if found.pop("seal", None) == _digest(found):
             return found
-    except UNREADABLE:
-        pass
     why = "its description is damaged" if is_run(folder) else f"it holds no {GROUP}"
     raise BadInput(f"run {str(folder)!r}: {why}")
 

@@ -87,7 +87,7 @@ def _names_of(groups: str) -> list[str]:
     return names
 
 
-def to_html(run: Run) -> bytes:
+def to_html(run: Run) -> str:
     """Return the HTML report."""
     from mushrooms.reports import check_page  # drawing takes a second to import
 
@@ -135,9 +135,9 @@ def show(run: Run) -> None:
     console = new_console(soft_wrap=True)
     console.print(table)
     if run.speed:
-        best = f"{run.speed.best_ns:.4g} ns per collision"
         console.print(
-            f"Speed on {run.speed.scene}: {best}, best of {run.speed.repeats} x {run.speed.collisions}."
+            f"Speed on {run.speed.scene}: {run.speed.best_ns:.4g} ns per collision,"
+            f" best of {run.speed.repeats} x {run.speed.collisions}."
         )
     for result in run.results:
         if result.group == "profile" and result.verdict == "pass":

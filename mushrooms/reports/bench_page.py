@@ -21,16 +21,15 @@ ALL = "all"  # workloads, in one table
 BESIDE = "moving-cap-1e7"  # what its times are compared with
 
 
-def to_html(record: Record, speed: bytes) -> bytes:
+def to_html(record: Record, speed: bytes) -> str:
     """Return the page; `speed` is its first picture, as SVG."""
-    page = render(
+    return render(
         "bench.html.jinja",
         record=record,
         speed=embed(speed),
         growth=embed(growth(record.growth)),
         rows=[_row(p) for p in record.points],
     )
-    return page.encode("utf-8")
 
 
 def _row(p: Point) -> dict[str, Any]:

@@ -32,14 +32,14 @@ MAX_LISTED = 200
 EXACT = 1e-2  # ulps at which answers with no error at all are drawn
 
 
-def to_html(run: Run) -> bytes:
+def to_html(run: Run) -> str:
     """Return the page."""
     report = reports.new_report(run)
     seen = [verdict for verdict in report.total.counts if verdict == "pass" or report.total.counts[verdict]]
     others = [r for r in run.results if r.verdict != "pass" or r.is_known]
     by_id = {vector.id: vector for vector in vectors.load(run.level)}
     cases = [_case(result, by_id[result.id]) for result in _worst(run) if result.id in by_id]
-    page = render(
+    return render(
         "check.html.jinja",
         report=report,
         seen=seen,
@@ -54,7 +54,6 @@ def to_html(run: Run) -> bytes:
         sharp=SHARP,
         fair=FAIR,
     )
-    return page.encode("utf-8")
 
 
 def _worst(run: Run) -> list[Result]:

@@ -122,7 +122,7 @@ def _table() -> Iterator[_Entry]:
 
 MAX_LINE = 2**24  # bytes of one answer: a trajectory of 10^5 collisions
 MAX_STDERR = 2**15  # bytes kept of the first and of the last that it wrote there
-GRACE = 1.0  # seconds between the end of its output and its exit, and between its exit and its helpers'
+GRACE = 1.0  # seconds between the end of its output and its exit; decides a message only
 POLL = 0.05  # seconds between looks at a silent process: a child of it may hold the pipe when it is gone
 # What calculating with numbers of a nonsense answer may raise, however a formula is written.
 NOT_NUMBERS = (ArithmeticError, ValueError)
@@ -231,7 +231,7 @@ class Process:
         return answer
 
     def finish(self, line: bytes, timeout: float) -> None:
-        """Write a last line and see the process end by itself, silently.
+        """Write a last line and see the process and its children end by themselves, silently.
 
         Raises:
             CheckFailure: wrong-format for further output, timed-out, crashed; fail for a process left behind.
@@ -251,7 +251,7 @@ class Process:
         if status := self._status():
             raise CheckFailure("crashed", f"{status} after `stop`")
         # A helper that ends because the process has ended does so a little later.
-        if not _comes_true(lambda: not self._descendants.alive()):
+        if not _comes_true(lambda: not self._descendants.alive(), deadline):
             raise CheckFailure("fail", "left a child process running after `stop`")
         self._advance(b"", 0.0)
         self._check_silence()  # of the helpers
@@ -322,14 +322,13 @@ class Process:
             return f"was killed by signal {result.si_status}"
 
     def _ending(self) -> str:
-        if not _comes_true(self._has_exited):
+        if not _comes_true(self._has_exited, time.monotonic() + GRACE):
             return "closed its standard output"
         return (self._status() or "exited with status 0") + " before it answered"
 
 
-def _comes_true(condition: Callable[[], bool]) -> bool:
-    """Wait a little for something to be so, and tell whether it is."""
-    deadline = time.monotonic() + GRACE
+def _comes_true(condition: Callable[[], bool], deadline: float) -> bool:
+    """Wait for something to be so until the deadline, and tell whether it is."""
     while not (is_so := condition()) and time.monotonic() < deadline:
         time.sleep(POLL / 5)
     return is_so

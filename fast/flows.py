@@ -10,15 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from fast.ensemble import follow
-from fast.kernel import records
 from fast.kernel.records import FloatArray, Followed, IntArray, unfilled_ends
 from fast.kernel.single import ANSWER_LOST
 from fast.pieces import laws_in_lanes
 from fast.starts import least_collisions, only_stop
-from fast.step import as_arrays, fitted_start, next_collision, trouble
+from fast.step import as_arrays, end_of_path, fitted_start, next_collision
 from fast.units import fit, scaled
 from fast.validation import MOST_TO_A_TIME, check_states, check_threads
-from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State, Undecided, check_scene
+from scene import InvalidState, Outcome, Rejected, Scene, State, Undecided, check_scene
 from scene.refusal import check_number
 
 
@@ -75,7 +74,7 @@ def carry(
     done, _ = follow_to(scene, starts, t_end, threads)
     ends = zip(done.codes.tolist(), done.states[:, 2:].tolist(), done.counts.sum(axis=1), strict=True)
     arrivals = iter(
-        Horizon(t_end, *place) if code == records.HORIZON else trouble(code, scene, state, n)
+        end_of_path(code, scene, state, n, t_end, place)
         for state, (code, place, n) in zip(starts, ends, strict=True)
     )
     every = unfilled_ends(np.empty((len(states), 6)), 1, (1, 1))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast.flows import follow_to
+from fast.flows import carry
 from fast.kernel import pools, records
 from fast.kernel.compiling import kept
 from fast.kernel.follow import advance
@@ -156,8 +156,8 @@ def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple
 
 def flights(scene: Scene, states: Sequence[State], t_end: float) -> tuple[int, float]:
     """Follow states to t_end in one thread, as ensembles are: number of collisions, seconds."""
-    done, seconds = follow_to(scene, states, t_end, 1)
-    return int(done.counts.sum()), seconds
+    run, seconds = carry(scene, states, [None] * len(states), t_end, 1)
+    return int(run.wall_counts.sum()), seconds
 
 
 def as_particle(p: FloatArray, wall: int) -> Particle:

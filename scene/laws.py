@@ -179,7 +179,7 @@ def piece_at(law: Law, time: Fraction) -> Piece:
         A float (constant for ever), the Fourier law itself, or the Quadratic up to its end.
     """
     if isinstance(law, BangBang):
-        return law.knots[0][1] if is_constant(law) else _leg_at(law.knots, time)
+        return law.knots[0][1] if is_constant(law) else leg_at(law, time)
     if isinstance(law, Fourier):
         return law.mean if is_constant(law) else law
     return law
@@ -190,11 +190,12 @@ def _exact_times(knots: tuple[tuple[float, float], ...]) -> list[Fraction]:
     return [Fraction(t) for t, _ in knots]
 
 
-def _leg_at(knots: tuple[tuple[float, float], ...], time: Fraction) -> Quadratic:
-    times = _exact_times(knots)
+def leg_at(law: BangBang, time: Fraction) -> Quadratic:
+    """Return the half leg that holds at `time` and just after it, also of a law at rest."""
+    times = _exact_times(law.knots)
     period = times[-1] - times[0]
-    n_periods = 0 if times[0] <= time < times[-1] else (time - times[0]) // period
-    early, late = _halves(knots, bisect_right(times, time - n_periods * period) - 1, n_periods)
+    n_periods = (time - times[0]) // period
+    early, late = _halves(law.knots, bisect_right(times, time - n_periods * period) - 1, n_periods)
     return early if time < early.end else late
 
 

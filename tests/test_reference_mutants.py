@@ -531,7 +531,7 @@ def level_normal(honest, self, wall, s):
 @faults.replacing(MovingWalls, "law")
 def still_slope(honest, self, name, s):
     jet = honest(self, name, s)
-    return Jet(jet.f, None, None) if name == "slope" else jet
+    return Jet(jet.f, self.arithmetic.zero, self.arithmetic.zero) if name == "slope" else jet
 
 
 @faults.replacing(MovingWalls, "width")
@@ -539,13 +539,11 @@ def width_with_still_nu(honest, self, s):
     if "nu" not in self.timeline.laws:
         return honest(self, s)
     nu, r = self.law("nu", s), self.law("r", s)
-    return Jet(nu.f * r.f, None if r.d1 is None else nu.f * r.d1, None)
+    return Jet(nu.f * r.f, nu.f * r.d1, self.arithmetic.zero)
 
 
 @faults.replacing(walls, "square")
 def square_without_second_derivative(honest, arithmetic, p):
-    if p.d1 is None:
-        return Jet(arithmetic.square(p.f), None, None)
     return Jet(arithmetic.square(p.f), 2 * (p.f * p.d1), 2 * arithmetic.square(p.d1))
 
 

@@ -19,7 +19,6 @@ from mpmath import fp
 
 from scene import exact, mixed
 from scene.exact import half_angle, leg_intervals, leg_polynomial, one_plus_square
-from scene.given import MAX_HARMONICS
 from scene.laws import (
     BangBang,
     Law,
@@ -33,8 +32,6 @@ from scene.laws import (
 from scene.laws import exact as number
 from scene.precision import decimals
 from scene.refusal import InvalidScene
-
-ALIKE = 2.0**-40  # how near a ratio of two periods, as given, is to one of small numbers
 
 Laws = Mapping[str, Law]
 
@@ -94,25 +91,10 @@ def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
         )
     if isinstance(laws[first], BangBang) and isinstance(laws[second], BangBang):
         return "repeat the knots of the shorter, or let it rest until the longer ends"
-    found = _multiples(a, b)
-    common = "a period that holds a whole number of each"
-    if found is not None:
-        shared = decimals().nstr(found[0] * a.value(decimals()), 6)
-        common = (
-            f"the period {shared}, {found[0]} times that of {first} and {found[1]} times that of {second}"
-        )
-    return f"let both have {common}, and put waves further back in cos and sin (or repeat the knots)"
-
-
-def _multiples(a: Period, b: Period) -> tuple[int, int] | None:
-    """Return equally long multiples of two given periods; None if they need too many harmonics."""
-    ctx = decimals()
-    ratio = a.value(ctx) / b.value(ctx)
-    if not 1 <= MAX_HARMONICS * ratio <= MAX_HARMONICS**2:  # far beyond, it is no float either
-        return None
-    near = Fraction(float(ratio)).limit_denominator(MAX_HARMONICS)
-    is_near = near.numerator <= MAX_HARMONICS and abs(float(ratio) - near) <= ALIKE * near
-    return (near.denominator, near.numerator) if is_near else None
+    return (
+        "let both have a period that holds a whole number of each,"
+        " and put waves further back in cos and sin (or repeat the knots)"
+    )
 
 
 def _is_clear(condition: Condition) -> bool:

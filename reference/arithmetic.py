@@ -238,17 +238,6 @@ class Arithmetic:
         ends = [angle - 2 * n * half_turn for half_turn in half_turns]
         return self.number(omega), self.between(min(ends), max(ends))
 
-    def period(self, omega: float | None, length: Fraction | None) -> Interval:
-        """Enclose a period, given as itself or by its angular frequency."""
-        if length is not None:
-            return self.number(length)
-        assert omega is not None
-        return 2 * self._pi(self.prec) / self.number(omega)
-
-    def is_full_turn(self, omega: Interval, length: Fraction) -> bool:
-        """Tell whether omega times a length of time is 2 pi or more; 7 is required, to be safe."""
-        return not libmpf.mpf_lt((omega * self.number(length))._mpi_[0], libmpf.from_int(7))
-
     def _pi(self, bits: int) -> Interval:
         with CONSTANTS:
             low, high = libelefun.mpf_pi(bits, _FLOOR), libelefun.mpf_pi(bits, _CEILING)

@@ -32,7 +32,7 @@ class Timeline:
     def __init__(self, arithmetic: Arithmetic, scene: Scene, instant: Fraction) -> None:
         self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in laws(scene).items()}
         shared = period(scene)
-        length = None if shared is None else arithmetic.period(shared.omega, shared.length)
+        length = None if shared is None else shared.value(arithmetic.context)
         self.turn = None if length is None else arithmetic.upper(length)  # a period at least
         self._arithmetic = arithmetic
         # Particles at rest at several places ask for the same parts of a period.

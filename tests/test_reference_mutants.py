@@ -400,28 +400,6 @@ def test_a_leap_within_an_enclosed_time_is_proved(working):
     assert len(claim.steps) == 2 or (working <= 15 and claim.outcome == "undecided")
 
 
-@pytest.mark.parametrize("i", range(40))
-def test_a_floor_that_rises_within_an_enclosed_time_is_proved(i):
-    """After the side, the floor begins to rise a little before or after it would be met."""
-    knot = 4096.0 + 1.0 + (i - 20) * 2.0**-24
-    low = BangBang(((4096.0, 1.0), (knot, 1.0), (knot + 2.0**-20, 0.5), (4104.0, 0.5), (4112.0, 1.0)))
-    q = State(4096.0, 0.5, -0.25, 1.0, -0.75 + 2.0**-30)
-    for working in (8, 20):
-        claim = prove_path(Stem(w=1.0, h=low), q, 2, working=working)
-        assert len(claim.steps) == 2 or working == 8
-
-
-def test_slow_particles_beside_waves_are_proved():
-    """Slower than a floor of waves that cancel at times, and near it: no wall is skipped."""
-    draw = random.Random(1)
-    for i in range(60):
-        left, v, t = 10.0 ** -draw.uniform(1.0, 4.0), 10.0 ** -draw.uniform(0.0, 5.0), draw.random()
-        floor = sunk(1 + i % 4, left, draw.random())
-        height = left * draw.uniform(0.5, 1.0) if i % 2 else value(mpmath.fp, floor, t) * 0.9
-        q = State(t, 0.25, -height, 0.125 * v, v if i % 3 else -v)
-        assert prove_step(Stem(w=1.0, h=floor), q, t + 4.0)
-
-
 def test_places_known_to_some_tenths_are_proved(tally):
     """Eight decimals are too few for twelve flights: enclosures end as wide as the table."""
     draw = random.Random(5)

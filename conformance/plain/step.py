@@ -307,7 +307,7 @@ class Flight:
         return value, gap.ft + gap.fx * self.vx + gap.fy * self.vy
 
     def gap(self, wall: Wall, s: float) -> Gap:
-        """Return a wall's function at a time; it is evaluated once, for the search comes back to most times."""
+        """Return a wall's function at a time, evaluated once: the search comes back to most times."""
         if (wall, s) not in self.known:
             self.known[wall, s] = self.evaluate(wall, s)
         return self.known[wall, s]

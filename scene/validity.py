@@ -12,8 +12,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from math import isfinite, prod
+from math import inf, isfinite, prod
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from scene import exact, mixed
 from scene.exact import half_angle, leg_intervals, leg_polynomial, one_plus_square
@@ -26,6 +28,7 @@ from scene.laws import (
     period_of,
     shared_period,
     value,
+    values,
 )
 from scene.laws import exact as number
 from scene.precision import decimals
@@ -160,13 +163,26 @@ def _on_circle(condition: Condition) -> Iterator[tuple[exact.Polynomial, Fractio
         yield total, -bound, bound
 
 
+def _least(condition: Condition, start: float, span: float, n: int) -> Sequence[int]:
+    """Return after which n-ths of a period a condition's excess may be least; all, if floats do not tell."""
+    # Floats know t, and hence the phase of a wave, to some 2^-52 of it: here to 2^-30 of a turn.
+    if not abs(start) + span < 2.0**18 * span:
+        return range(n)
+    times = start + span * np.arange(n) / n
+    sizes = (prod(max(map(abs, bounds(law)[:2])) for law in factors) for _, factors in condition.terms)
+    with np.errstate(all="ignore"):
+        found = sum(sign * prod(values(law, times) for law in factors) for sign, factors in condition.terms)
+        near = np.min(found) + 2.0**-20 * sum(sizes)
+    return np.flatnonzero(found <= near).tolist() if near < inf else range(n)
+
+
 def _message(laws: Laws, condition: Condition, known: Fraction | None = None) -> str:
     # The proof is done; this only looks for an instant to show in the message. In mp no scene overflows.
     ctx = decimals()
     shared = shared_period(laws.values())
-    span = shared.value(ctx) if shared else ctx.mpf(0)
+    span, n = (shared.value(ctx), 512) if shared else (ctx.mpf(0), 1)
     start = next((law.knots[0][0] for law in laws.values() if isinstance(law, BangBang)), 0.0)
-    times = [ctx.mpf(start) + span * i / 512 for i in range(512 if span else 1)]
+    times = [ctx.mpf(start) + span * i / n for i in _least(condition, start, float(span), n)]
     if known is not None:
         times.append(number(ctx, known))
 
@@ -177,5 +193,5 @@ def _message(laws: Laws, condition: Condition, known: Fraction | None = None) ->
         return str(ctx.nstr(x, 6))
 
     worst = min(times, key=excess)
-    values = ", ".join(f"{name} = {shown(value(ctx, law, worst))}" for name, law in laws.items())
-    return f"{condition.text} fails by {shown(excess(worst))} near t = {shown(worst)}, where {values}"
+    places = ", ".join(f"{name} = {shown(value(ctx, law, worst))}" for name, law in laws.items())
+    return f"{condition.text} fails by {shown(excess(worst))} near t = {shown(worst)}, where {places}"

@@ -41,7 +41,8 @@ _MODULES = {
 def __getattr__(name: str) -> Any:
     for module, names in _MODULES.items():
         if name in names:
-            return getattr(import_module(f"fast.{module}"), name)
+            found = globals()[name] = getattr(import_module(f"fast.{module}"), name)  # not asked for again
+            return found
     raise AttributeError(f"module 'fast' has no attribute {name!r}")
 
 

@@ -28,7 +28,7 @@ def carry(
 ) -> list[tuple[Outcome, tuple[float, float] | None]]:
     """Return each particle's outcome at t_end and its first capture interval; refuse only bad starts."""
     refusals = [flows.refuse(scene, state, t_end) for state in states]
-    run = flows.carry(scene, states, refusals, t_end, check_threads(None))
+    run, _ = flows.carry(scene, states, refusals, t_end, check_threads(None))
     return [
         # Only a particle that arrives has a capture interval.
         (outcome, (begin, end) if isinstance(outcome, Horizon) and not math.isnan(begin) else None)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast.flows import follow_to
+from fast.flows import carry
 from fast.kernel import pools, records
 from fast.kernel.compiling import kept
 from fast.kernel.follow import advance
@@ -28,10 +28,10 @@ from fast.kernel.records import (  # isort: skip
 from fast.kernel.scalar_step import KNOWN, MET
 from fast.kernel.walls import wall_residual
 from fast.kernel.worker import DISK, GENERAL, careful_at, new_worker, run_careful
-from fast.paths import FineTrajectory, as_trajectory, end_of_path, fill_fine_path
+from fast.paths import FineTrajectory, as_trajectory, fill_fine_path
 from fast.pieces import laws_in_lanes
 from fast.starts import only_stop
-from fast.step import WALL_NAMES, as_arrays, fitted_start
+from fast.step import WALL_NAMES, as_arrays, end_of_path, fitted_start
 from fast.units import compile_scene, fit, outward
 from scene import Collision, Outcome, Scene, State
 
@@ -156,8 +156,8 @@ def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple
 
 def flights(scene: Scene, states: Sequence[State], t_end: float) -> tuple[int, float]:
     """Follow states to t_end in one thread, as ensembles are: number of collisions, seconds."""
-    done, seconds = follow_to(scene, states, t_end, 1)
-    return int(done.counts.sum()), seconds
+    run, seconds = carry(scene, states, [None] * len(states), t_end, 1)
+    return int(run.wall_counts.sum()), seconds
 
 
 def as_particle(p: FloatArray, wall: int) -> Particle:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,15 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from fast.ensemble import follow
-from fast.kernel import records
-from fast.kernel.records import FloatArray, Followed, IntArray, unfilled_ends
+from fast.kernel.records import FloatArray, IntArray, unfilled_ends
 from fast.kernel.single import ANSWER_LOST
 from fast.pieces import laws_in_lanes
 from fast.starts import least_collisions, only_stop
-from fast.step import as_arrays, fitted_start, next_collision, trouble
+from fast.step import as_arrays, end_of_path, fitted_start, next_collision
 from fast.units import fit, scaled
 from fast.validation import MOST_TO_A_TIME, check_states, check_threads
-from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State, Undecided, check_scene
+from scene import InvalidState, Outcome, Rejected, Scene, State, Undecided, check_scene
 from scene.refusal import check_number
 
 
@@ -63,54 +61,41 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
     for i, refusal in enumerate(refusals):
         if isinstance(refusal, Rejected):
             raise InvalidState(f"particle {i}: {refusal.reason}")
-    return carry(scene, states, refusals, t_end, threads)
+    return carry(scene, states, refusals, t_end, threads)[0]
 
 
 def carry(
     scene: Scene, states: Sequence[State], refusals: Sequence[Outcome | None], t_end: float, threads: int
-) -> Flow:
-    """Carry particles to t_end; those that `refuse` refuses stay where they are."""
-    is_free = np.array([refusal is None for refusal in refusals], dtype=bool)
-    starts = list(itertools.compress(states, is_free))
-    done, _ = follow_to(scene, starts, t_end, threads)
-    ends = zip(done.codes.tolist(), done.states[:, 2:].tolist(), done.counts.sum(axis=1), strict=True)
-    arrivals = iter(
-        Horizon(t_end, *place) if code == records.HORIZON else trouble(code, scene, state, n)
-        for state, (code, place, n) in zip(starts, ends, strict=True)
-    )
-    every = unfilled_ends(np.empty((len(states), 6)), 1, (1, 1))
-    for whole, own in zip(every, done, strict=True):
-        whole[is_free] = own
-    outcomes = [refusal or next(arrivals) for refusal in refusals]
-    return Flow(outcomes, every.t_in[:, 0, 0], every.t_out[:, 0, 0], every.counts, every.careful)
-
-
-def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int) -> tuple[Followed, float]:
-    """Follow particles to t_end, those whose units agree together; energies are left in the kernel's units.
+) -> tuple[Flow, float]:
+    """Carry particles to t_end, those whose units agree together; those refused stay where they are.
 
     Returns:
         What became of them, and the seconds that took.
 
     Raises:
-        BadInput: scene, a state or an answer does not fit into binary64: see fast.units.
+        BadInput: the scene does not fit into binary64: see fast.units.
     """
-    starts = [fitted_start(scene, state) for state in states]
-    in_lanes, (rows, walls) = laws_in_lanes(fit(scene).scene), as_arrays(starts)
-    followed, seconds = unfilled_ends(rows, 1, (1, 1)), 0.0
-    for units in sorted({start.units for start in starts}):
-        those = np.array([i for i, start in enumerate(starts) if start.units == units])
+    starts = {i: fitted_start(scene, states[i]) for i, refusal in enumerate(refusals) if refusal is None}
+    every, outcomes, seconds = unfilled_ends(np.empty((len(states), 6)), 1, (1, 1)), list(refusals), 0.0
+    for units in sorted({start.units for start in starts.values()}):
+        those = [i for i, start in starts.items() if start.units == units]
+        rows, walls = as_arrays([starts[i] for i in those])
+        done = unfilled_ends(rows, 1, (1, 1))
         stop = only_stop(units.horizon(t_end))
-        done = unfilled_ends(rows[those], 1, (1, 1))
-        seconds += follow(in_lanes, done, walls[those], stop, threads)
+        seconds += follow(laws_in_lanes(fit(scene).scene), done, walls, stop, threads)
         # t, its low part, x, y, vx, vy; begin and end of the capture interval
         numbers = np.column_stack([done.states, done.t_in[:, 0, 0], done.t_out[:, 0, 0]])
         numbers, is_kept = scaled(numbers, np.append(units.of_step(), [units.time, units.time]))
         is_lost = ~is_kept.all(axis=1)
-        done.codes[is_lost], numbers[is_lost] = ANSWER_LOST, np.nan
-        done.states[:], done.t_in[:, 0, 0], done.t_out[:, 0, 0] = numbers[:, :6], numbers[:, 6], numbers[:, 7]
-        for whole, own in zip(followed, done, strict=True):
+        done.codes[is_lost], numbers[is_lost, 6:] = ANSWER_LOST, np.nan
+        done.t_in[:, 0, 0], done.t_out[:, 0, 0] = numbers[:, 6], numbers[:, 7]
+        for whole, own in zip(every, done, strict=True):
             whole[those] = own
-    return followed, seconds
+        ends = zip(those, done.codes.tolist(), done.counts.sum(axis=1), numbers[:, 2:6], strict=True)
+        for i, code, n, place in ends:
+            outcomes[i] = end_of_path(code, scene, states[i], n, t_end, place)
+    found = [outcome for outcome in outcomes if outcome is not None]
+    return Flow(found, every.t_in[:, 0, 0], every.t_out[:, 0, 0], every.counts, every.careful), seconds
 
 
 def refuse(scene: Scene, state: State, t_end: float) -> Rejected | Undecided | None:

@@ -8,6 +8,7 @@ which it ends, or the hit after which an energy is reached.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
@@ -24,11 +25,11 @@ from fast.kernel.single import ANSWER_LOST
 from fast.kernel.worker import Loops, careful_at, new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import only_stop
-from fast.step import WALL_CODES, WALL_NAMES, Start, as_arrays, start_at, trouble
+from fast.step import WALL_CODES, WALL_NAMES, Start, as_arrays, end_of_path, start_at
 from fast.threads import follow_path
 from fast.units import LateTime, fit, scaled
 from fast.validation import MAX_STEPS, check_end, check_energy, check_states
-from scene import Horizon, Mushroom, Outcome, Scene, State, Undecided, Wall, check_scene
+from scene import Mushroom, Outcome, Scene, State, Undecided, Wall, check_scene
 from scene.geometry import half_width
 from scene.laws import values
 from scene.refusal import BadInput, check_count, shown
@@ -73,7 +74,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     t_end = check_end(t_end)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
     try:
-        start = start_at(scene, state, None if t_end == np.inf else t_end)
+        start = start_at(scene, state, min(t_end, sys.float_info.max))
     except LateTime as error:
         return Collisions([], np.empty((0, 6)), Undecided(str(error)))
     rows, walls = as_arrays([start])
@@ -103,13 +104,6 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
 def place_after(steps: FloatArray, state: State) -> FloatArray:
     """Return x, y, vx, vy after the last of some steps, or of the start: where it is, what rests stays."""
     return steps[-1, 2:] if len(steps) else np.array([state.x, state.y, state.vx, state.vy])
-
-
-def end_of_path(code: int, scene: Scene, state: State, n: int, t_end: float, place: FloatArray) -> Outcome:
-    """Return why a path ends after n collisions: a horizon at a place, or what a code stands for."""
-    if code == records.HORIZON:
-        return Horizon(t_end, *(float(v) for v in place))
-    return trouble(code, scene, state, n)
 
 
 class FineTrajectory(NamedTuple):

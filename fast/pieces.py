@@ -37,6 +37,11 @@ from scene import Scene
 SHALLOW = 0.25  # of its mean: see `waves_of`
 MAX_PIECES = 2**15
 REMAINDER = 2.0**-54
+ALWAYS = np.array([math.inf])
+# No piece serves: known neither when laws repeat nor up to when, so that steps are careful ones.
+NO_PIECES = Pieces(
+    0.0, math.inf, 0.0, np.zeros(1), np.zeros((1, 2)), ALWAYS, ALWAYS, np.zeros((1, 4, 1)), -1.0
+)
 INSIDE = 1.0 - 2.0**-50  # of a piece: how far a flight ends from its middle is a sum that lanes round
 
 
@@ -52,19 +57,17 @@ class Cut(NamedTuple):
 def laws_in_lanes(scene: Scene) -> LawsInLanes:
     """Return a scene, which is in the kernel's units, as the lanes know it."""
     compiled = compile_scene(scene)
-    waves = waves_of(compiled)
-    return in_lanes(compiled, None if waves else pieces_of(compiled, form_of(compiled)), waves)
-
-
-def in_lanes(compiled: Compiled, pieces: Pieces | None, waves: LaneWaves | None = None) -> LawsInLanes:
-    """Return a scene as the lanes know it by its waves or its pieces; with none, steps are careful ones."""
-    if pieces is None:
+    laws, waves = compiled.laws, waves_of(compiled)
+    if waves:
+        form = TWO_WAVES if laws[SHARED, N_HARMONICS] > 1 else ONE_WAVE
         # Of waves the lanes know when they repeat, and up to when their phase is known.
-        period, until = _period_and_until(compiled) if waves else (math.inf, -1.0)
-        always, nothing = np.array([math.inf]), np.zeros((1, 4, 1))
-        pieces = Pieces(0.0, period, 0.0, np.zeros(1), np.zeros((1, 2)), always, always, nothing, until)
-    slope = None if is_slope_moving(compiled) else float(compiled.laws[SLOPE, LEVEL])
-    return LawsInLanes(compiled, pieces, form_of(compiled), slope, waves or NO_WAVES)
+        period, until = _period_and_until(laws)
+        pieces = NO_PIECES._replace(period=period, until=until)
+    else:
+        form = SERIES if (laws[:SHARED, KIND] == FOURIER).any() else PARABOLA
+        pieces = pieces_of(compiled, form) or NO_PIECES
+    slope = float(laws[SLOPE, LEVEL]) if laws[SLOPE, KIND] == CONSTANT else None
+    return LawsInLanes(compiled, pieces, form, slope, waves or NO_WAVES)
 
 
 def waves_of(compiled: Compiled) -> LaneWaves | None:
@@ -86,22 +89,10 @@ def waves_of(compiled: Compiled) -> LaneWaves | None:
     return LaneWaves(*omegas, *(tuple(row.tolist()) for row in rows))
 
 
-def _period_and_until(compiled: Compiled) -> tuple[float, float]:
-    period, _ = _period_and_origin(compiled.laws)
+def _period_and_until(laws: FloatArray) -> tuple[float, float]:
+    period, _ = _period_and_origin(laws)
     high = math.inf if period is None else float(period)
-    return high, 0.125 * MAX_QUADRANT * high / max(float(compiled.laws[SHARED, N_HARMONICS]), 1.0)
-
-
-def is_slope_moving(compiled: Compiled) -> bool:
-    """Tell whether a scene's sides turn."""
-    return bool(compiled.laws[SLOPE, KIND] != CONSTANT)
-
-
-def form_of(compiled: Compiled) -> int:
-    """Return in which form lanes know a scene's laws: waves, or pieces by the degree of their polynomials."""
-    if waves_of(compiled):
-        return TWO_WAVES if compiled.laws[SHARED, N_HARMONICS] > 1 else ONE_WAVE
-    return SERIES if (compiled.laws[:SHARED, KIND] == FOURIER).any() else PARABOLA
+    return high, 0.125 * MAX_QUADRANT * high / max(float(laws[SHARED, N_HARMONICS]), 1.0)
 
 
 def reach(compiled: Compiled, degree: int) -> float:
@@ -200,7 +191,7 @@ def _filled(
     if period is None:
         half, serves = np.array([math.inf]), np.array([math.inf])
     high, low = _pair(period) if period is not None else (math.inf, 0.0)
-    _, until = _period_and_until(compiled)
+    _, until = _period_and_until(compiled.laws)
     return Pieces(float(origin), high, low, begins, references, half, serves, coefficients, until)
 
 

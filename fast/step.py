@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 from fast.kernel import records, scalar_step, single
 from fast.kernel.records import Compiled, FloatArray, IntArray, Particle
 from fast.kernel.worker import careful_at
 from fast.units import ANSWER_LOST, LateTime, Units, fit
-from fast.validation import MOST_TO_A_TIME, check_state
+from fast.validation import MOST_TO_A_TIME
 from scene import (
     Collision,
     Horizon,
@@ -27,7 +27,7 @@ from scene import (
     check_scene,
 )
 from scene.geometry import placed, rounded
-from scene.refusal import BadInput, check_number
+from scene.refusal import BadInput
 from scene.states import check_numbers
 
 WALL_NAMES: dict[int, Wall] = {
@@ -73,73 +73,32 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
 
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1.
     """
-    known = latest[0]
-    if known is None or known.scene is not scene:
-        check_scene(scene)
-        known = None
+    check_scene(scene)
     try:
-        t_end = t_end if type(t_end) is float else check_number("t_end", t_end)
-        # What is common is not worth a call: a State of floats, in the scene of the question before.
-        if known is None or type(state) is not State:
-            state = check_state(scene, state)
-            known = prepare(scene, state, t_end)
-        t, x, y, vx, vy, wall = state.t, state.x, state.y, state.vx, state.vy, state.wall
-        is_plain = type(t) is type(x) is type(y) is type(vx) is type(vy) is float
-        if not is_plain or (wall is not None and not (isinstance(wall, str) and wall in known.walls)):
-            state = check_state(scene, state)
-            t, x, y, vx, vy, wall = msgspec.structs.astuple(state)
-        code, dt, t, x, y, vx, vy = known.single(
-            known.step_at, known.packed, t, x, y, vx, vy, known.walls[wall], t_end
-        )
-        if code in WALL_NAMES:
-            return Collision(WALL_NAMES[code], dt, t, x, y, vx, vy)
-        if code == records.HORIZON:
-            return Horizon(t_end, x, y, vx, vy)
-        if code == single.REFUSED:  # by the checks that follow, made in compiled code: they say why
-            check_numbers(scene, state, t_end)
-            fitted_start(scene, state).units.horizon(t_end)
+        if not is_plain(scene, state, t_end):
+            state, t_end = check_numbers(scene, state, t_end), float(t_end)
+        t, x, y, vx, vy, wall = state.t, state.x, state.y, state.vx, state.vy, WALL_CODES[state.wall]
+        ask, numbers = single.single_at_once(), fit(scene).packed
+        code, dt, t, x, y, vx, vy = ask(careful_at(), numbers, t, x, y, vx, vy, wall, t_end)
+        if code == single.REFUSED:  # by checks in compiled code: those that follow say why
+            start_at(scene, state, t_end).units.horizon(t_end)
     except LateTime as error:
         return Undecided(str(error))
     except BadInput as error:
         return Rejected(str(error))
-    return trouble(code, scene, state)
+    if code in WALL_NAMES:
+        return Collision(WALL_NAMES[code], dt, t, x, y, vx, vy)
+    return end_of_path(code, scene, state, 0, t_end, (x, y, vx, vy))
 
 
-class Prepared(NamedTuple):
-    """A scene that a question was about, with what the next one in it needs.
-
-    Attributes:
-        scene: kept, so that its address is no other scene's.
-        packed: its numbers for the kernels.
-        walls: codes of the walls that a state may name.
-        step_at: address of the careful step.
-        single: the compiled function around it.
-    """
-
-    scene: Scene
-    packed: FloatArray
-    walls: dict[Wall | None, int]
-    step_at: int
-    single: Callable[..., tuple[int, float, float, float, float, float, float]]
-
-
-latest: list[Prepared | None] = [None]  # of all threads; what is read of it is read once, and never changes
-
-
-def prepare(scene: Scene, state: State, t_end: float) -> Prepared:
-    """Return what questions in a scene need, and keep it for the next.
-
-    Raises:
-        BadInput: the scene does not fit into binary64; what is wrong with the question comes first.
-    """
-    try:
-        packed = fit(scene).packed
-    except BadInput:
-        check_numbers(scene, state, t_end)
-        raise
-    walls = {wall: WALL_CODES[wall] for wall in (None, *scene.walls)}
-    found = latest[0] = Prepared(scene, packed, walls, careful_at(), single.single_at_once())
-    return found
+def is_plain(scene: Scene, state: State, t_end: float) -> bool:
+    """Tell whether the types of a question are those of most: State, floats, a wall of the scene."""
+    return (
+        type(state) is State
+        and type(state.t) is type(state.x) is type(state.y) is type(state.vx) is type(state.vy) is float
+        and type(t_end) is float
+        and (state.wall is None or (isinstance(state.wall, str) and state.wall in scene.walls))
+    )
 
 
 class Start(NamedTuple):
@@ -161,11 +120,9 @@ class Start(NamedTuple):
         return np.array([s.t, 0.0, s.x, s.y, s.vx, s.vy])
 
 
-def start_at(scene: Scene, state: State, t_end: float | None = None) -> Start:
+def start_at(scene: Scene, state: State, t_end: float = sys.float_info.max) -> Start:
     """Return a state in the kernel's units; refuse what this stepper cannot hold, naming field and bound."""
-    state = check_state(scene, state)
-    check_numbers(scene, state, state.t if t_end is None else t_end)
-    return fitted_start(scene, state)
+    return fitted_start(scene, check_numbers(scene, state, t_end))
 
 
 def fitted_start(scene: Scene, state: State) -> Start:
@@ -197,11 +154,15 @@ TOO_LATE = (
 )
 
 
-def trouble(code: int, scene: Scene, state: State, n: int = 0) -> Outcome:
-    """Return what a code other than a wall's and HORIZON stands for, n collisions after a state.
+def end_of_path(
+    code: int, scene: Scene, state: State, n: int, t_end: float, place: Iterable[float]
+) -> Outcome:
+    """Return what a code other than a wall's stands for, n collisions after a state: for HORIZON a place.
 
     A state is refused before the first of them only: later, what looks like one beyond a wall is rounding.
     """
+    if code == records.HORIZON:
+        return Horizon(t_end, *map(float, place))
     if code == records.START and not n:
         wall = rounded(scene, state.t).nearest_wall(state.x, state.y, but=state.wall)
         return Undecided(placed(scene, state, wall, "within rounding of"))

@@ -18,6 +18,7 @@ import math
 import sys
 from fractions import Fraction
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import msgspec
@@ -33,9 +34,10 @@ from fast.kernel.records import (  # isort: skip
 )  # fmt: skip
 from scene import BangBang, Cap, Fourier, InvalidState, Law, Mushroom, Scene, State
 from scene.laws import Bounds, bounds, is_constant
-from scene.refusal import BadInput
+from scene.refusal import BadInput, InvalidScene
 from scene.sizes import size_bounds
 from scene.tables import laws, period, width_factors
+from scene.transforms import scaled_law, times_power
 
 HALF_PI = half_pi()
 TABLES = {"Cap": int(records.CAP), "Stem": int(records.STEM), "Mushroom": int(records.MUSHROOM)}
@@ -99,12 +101,10 @@ def _row(law: Law) -> list[float]:
     if isinstance(law, BangBang) and not is_constant(law):
         times = [knot[0] for knot in law.knots]
         values = [knot[1] for knot in law.knots]
-        legs = zip(law.knots, law.knots[1:], strict=False)
         accelerations = [
             4 * (Fraction(v1) - Fraction(v0)) / (Fraction(t1) - Fraction(t0)) ** 2
-            for (t0, v0), (t1, v1) in legs
-        ]
-        accelerations.append(Fraction(0))  # one for every knot keeps the columns simple
+            for (t0, v0), (t1, v1) in pairwise(law.knots)
+        ] + [Fraction(0)]  # one for every knot keeps the columns simple
         highs = [float(a) for a in accelerations]
         period = Fraction(times[-1]) - Fraction(times[0])
         return [
@@ -180,9 +180,7 @@ class Units(NamedTuple):
 
         One beyond all floats becomes the largest of them: whatever moves meets a wall long before.
         """
-        try:
-            math.ldexp(t_end, -self.time)
-        except OverflowError:
+        if math.isfinite(t_end) and math.isinf(times_power(t_end, -self.time)):
             return math.copysign(sys.float_info.max, t_end)
         return inward("t_end", t_end, self.time)
 
@@ -237,7 +235,7 @@ def fit(scene: Scene) -> Fitted:
             assert shared.length is not None  # a float, as the scene has found
             time = exponent(float(shared.length)) - TIME
     changed = {
-        name: _in_units(law, f"scene.{name}", 0 if name in ("nu", "slope") else length, time or 0)
+        name: _in_units(f"scene.{name}", law, 0 if name in ("nu", "slope") else length, time or 0)
         for name, law in laws(scene).items()
     }
     fitted = msgspec.structs.replace(scene, **changed)
@@ -266,10 +264,7 @@ def inward(field: str, number: float, exponent: int) -> float:
     Raises:
         InvalidState: it would lose bits, or be too large.
     """
-    try:
-        scaled = math.ldexp(number, -exponent)
-    except OverflowError:
-        scaled = math.inf
+    scaled = times_power(number, -exponent)
     if scaled == number or (abs(scaled) < math.inf and math.ldexp(scaled, exponent) == number):
         return scaled
     bound = "at least 2^-900" if abs(scaled) < 1.0 else "below 2^900 in size"
@@ -296,29 +291,19 @@ def outward(numbers: FloatArray, exponents: IntArray | int) -> FloatArray:
     return found
 
 
-def _in_units(law: Law, field: str, length: int, time: int) -> Law:
-    def size(number: float) -> float:
-        return _kept(field, number, length)
+def _in_units(field: str, law: Law, length: int, time: int) -> Law:
+    """Return a law with its values divided by 2^length and its times by 2^time, exactly.
 
-    def moment(number: float) -> float:
-        return _kept(field, number, time)
-
-    if isinstance(law, BangBang):
-        return BangBang(knots=tuple((moment(t), size(v)) for t, v in law.knots))
-    if isinstance(law, Fourier):
-        cos, sin = (tuple(size(a) for a in amplitudes) for amplitudes in (law.cos, law.sin))
-        return Fourier(
-            mean=size(law.mean),
-            omega=None if law.omega is None else _kept(field, law.omega, -time),
-            cos=cos,
-            sin=sin,
-            period=None if law.period is None else moment(law.period),
-        )
-    return size(law)
-
-
-def _kept(field: str, number: float, exponent: int) -> float:
+    Raises:
+        BadInput: a number would lose bits, or be too large.
+    """
     try:
-        return inward(field, number, exponent)
-    except InvalidState as error:
-        raise BadInput(str(error)) from None
+        found = scaled_law(law, -length, -time)
+        is_kept = scaled_law(found, length, time) == law
+    except InvalidScene:  # of a law none of whose numbers may be infinite, or a frequency 0
+        is_kept = False
+    if not is_kept:
+        given = msgspec.json.encode(law).decode()
+        bound = "must have numbers of 2^-900 to 2^900 in size, or 0, beside the table's size and period"
+        raise BadInput(f"{field} = {given}, {bound}")
+    return found

@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 import numbers
 import os
+import sys
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from scene import InvalidState, Scene, State
 from scene.refusal import BadInput, check_count, check_number, listed, shown
+from scene.states import check_numbers
 
 MAX_STEPS = 10**7  # collisions of one trajectory, kept in memory: half a gigabyte
 # Collisions of one particle: on the way to a given time, some seconds of work; in an ensemble, a minute.
@@ -23,26 +25,6 @@ MAX_FIRST = 2**62  # number of a first particle: what is added to it stays a 64-
 MAX_CYCLES = 10**6
 MAX_KEPT = 10**9  # energies and times of capture that an ensemble keeps: eight gigabytes
 LARGEST_ENERGY = 2.0**800
-NUMBERS = ("t", "x", "y", "vx", "vy")
-
-
-def check_state(scene: Scene, state: object) -> State:
-    """Return a state whose numbers are floats; `scene.states.check_numbers` looks at their sizes.
-
-    Raises:
-        BadInput: `state` is no State.
-        InvalidState: a field is no number, or `wall` is no wall of the scene.
-    """
-    if not isinstance(state, State):
-        raise BadInput(f"state = {shown(state)}, must be a State")
-    wall = state.wall
-    if wall is not None and not (isinstance(wall, str) and wall in scene.walls):
-        raise InvalidState(f"state.wall = {shown(wall)}, must be null or one of {', '.join(scene.walls)}")
-    is_float = type(state.t) is type(state.x) is type(state.y) is type(state.vx) is type(state.vy) is float
-    if is_float and type(state) is State:
-        return state
-    t, x, y, vx, vy = (check_number(f"state.{name}", getattr(state, name), InvalidState) for name in NUMBERS)
-    return State(t, x, y, vx, vy, wall)
 
 
 def check_end(t_end: object) -> float:
@@ -56,7 +38,7 @@ def check_states(scene: Scene, states: object) -> list[State]:
     found = []
     for i, state in enumerate(_check_sequence("states", states, "State")):
         try:
-            found.append(check_state(scene, state))
+            found.append(check_numbers(scene, state, sys.float_info.max))  # type: ignore[arg-type]  # of whatever type
         except BadInput as error:
             raise InvalidState(f"particle {i}: {error}") from None
     return found

@@ -6,6 +6,7 @@ the whole trajectory begins again at twice that. What is claimed, and why it fol
 
 from __future__ import annotations
 
+import sys
 from fractions import Fraction
 
 from reference.answers import Jacobian, Outcome, ProvedCollision, Trajectory
@@ -14,9 +15,10 @@ from reference.chain import bounce, collision, fly_on, horizon
 from reference.course import Course, Hit
 from reference.jacobian import Matrix, chained, enclosures, identity, step_jacobian
 from reference.start import depart
-from reference.step import GUARD_DIGITS, MAX_DIGITS, checked_digits, checked_state, require_digits
+from reference.step import GUARD_DIGITS, MAX_DIGITS, checked_digits, require_digits
 from scene import Scene, State, Undecided, Undefined
 from scene.refusal import check_count, check_number
+from scene.states import check_numbers
 
 MAX_COLLISIONS = 1_000_000
 
@@ -80,7 +82,7 @@ def _follow(
         Undecidable: the precision does not suffice for the digits asked for.
         InvalidState: the start is not a state of this table.
     """
-    state = checked_state(scene, state, getattr(state, "t", 0.0) if t_end is None else t_end)
+    state = check_numbers(scene, state, sys.float_info.max if t_end is None else t_end)
     matrix = identity(arithmetic) if is_differentiated else None
     steps: list[ProvedCollision] = []
     outcome: Outcome | None

@@ -80,17 +80,6 @@ def checked_digits(scene: Scene, digits: int) -> int:
     return check_count("digits", digits, 1, MAX_DIGITS)
 
 
-def checked_state(scene: Scene, state: State, t_end: float) -> State:
-    """Return a state whose numbers are all floats.
-
-    Raises:
-        InvalidState: naming field, value and bound.
-    """
-    check_numbers(scene, state, t_end)
-    t, x, y, vx, vy = (float(number) for number in (state.t, state.x, state.y, state.vx, state.vy))
-    return State(t, x, y, vx, vy, state.wall)
-
-
 def require_digits(found: ProvedCollision, digits: int) -> None:
     """Require the digits asked for: of dt, and of velocity and position relative to their vectors.
 
@@ -119,7 +108,7 @@ def _attempt(
     is_measured: bool,
 ) -> Outcome:
     """Answer at one precision."""
-    state = checked_state(scene, state, t_end)
+    state = check_numbers(scene, state, t_end)
     course = depart(arithmetic, scene, state, Fraction(float(t_end)))
     if isinstance(course, Undefined):
         return course

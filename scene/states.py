@@ -83,8 +83,8 @@ Stepper = Callable[[Scene, State, float], Outcome]  # (scene, state, t_end): wha
 ON_WALL = 2.0**-20
 
 
-def check_numbers(scene: Scene, state: State, t_end: float) -> None:
-    """Refuse arguments that are no question, before any arithmetic.
+def check_numbers(scene: Scene, state: State, t_end: float) -> State:
+    """Refuse arguments that are no question, before any arithmetic; return the state in floats.
 
     Args:
         scene: the table.
@@ -98,13 +98,15 @@ def check_numbers(scene: Scene, state: State, t_end: float) -> None:
     check_scene(scene)
     if not isinstance(state, State):
         raise InvalidState(f"state = {shown(state)}, must be a State")
-    for field in ("t", "x", "y", "vx", "vy"):
+    t, x, y, vx, vy = (
         check_number(f"state.{field}", getattr(state, field), InvalidState)
-    check_number("t_end", t_end, InvalidState)
-    if t_end < state.t:
-        raise InvalidState(f"t_end = {t_end!r}, must be >= state.t = {state.t!r}")
+        for field in ("t", "x", "y", "vx", "vy")
+    )
+    if check_number("t_end", t_end, InvalidState) < t:
+        raise InvalidState(f"t_end = {t_end!r}, must be >= state.t = {t!r}")
     # Of an array, `in` alone would ask for its truth.
     if state.wall is not None and not (isinstance(state.wall, str) and state.wall in scene.walls):
         raise InvalidState(
             f"state.wall = {shown(state.wall)}, must be null or one of {', '.join(scene.walls)}"
         )
+    return State(t, x, y, vx, vy, state.wall)

@@ -152,7 +152,7 @@ MET = {
     "talk-after-stop": ("protocol/stop", "wrong-format", "goodbye"),
     "helper-that-talks": ("protocol/stop", "wrong-format", "farewell"),
 }
-SLOW = "ignore-stop", "close-stdout", "huge-line", "endless-line", "daemon"
+SLOW = "ignore-stop", "slow-to-stop", "close-stdout", "huge-line", "endless-line", "daemon"
 SILENT = "late-answer", "ignore-sigterm", "half-a-line"
 
 
@@ -171,7 +171,8 @@ def failing(where: str, verdict: str) -> dict[str, str]:
 @pytest.mark.parametrize("name", deep_among((name for name in FAULTS if name != "slow"), *SLOW, *SILENT))
 def test_each_gets_its_verdict_and_no_other_case_suffers(verdicts, name):
     where, verdict, word = MET[name]
-    run = verdicts(name, HASTY if verdict == "timed-out" and where != "protocol/stop" else PATIENT)
+    is_waited_for = verdict == "timed-out" or word == "child"
+    run = verdicts(name, HASTY if is_waited_for else PATIENT)
     expected = failing(where, verdict)
     bad = [result for result in run.results if result.verdict != "pass"]
     assert {result.id: result.verdict for result in bad} == expected

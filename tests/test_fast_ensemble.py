@@ -8,23 +8,9 @@ from mpmath import fp
 from scipy import stats
 
 import fast
-from fast.starts import cycle_stops, initial_states
-from scene import BadInput, Fourier, Mushroom, State, load
+from fast.starts import initial_states
+from scene import BadInput, State, load
 from scene.geometry import table_at
-
-
-@pytest.mark.parametrize("name", ["moving-cap", "breathing-circle", "fermi-ulam"])
-def test_particles_start_alike_in_every_block(name):
-    """Whatever block a particle is drawn in, the first and the last of all among them."""
-    scene, random = load(name), np.random.default_rng(5)
-    whole = initial_states(scene, 5000, 50.0, 9)
-    for first in [0, 1, 4999, *random.integers(0, 5000, 20).tolist()]:
-        n = int(random.integers(1, 5001 - first))
-        assert np.array_equal(initial_states(scene, n, 50.0, 9, first), whole[first : first + n])
-    last = 2**62
-    assert np.array_equal(
-        initial_states(scene, 4, 50.0, 9, last)[3:], initial_states(scene, 1, 50.0, 9, last + 3)
-    )
 
 
 def test_blocks_are_parts_of_the_whole():
@@ -85,27 +71,6 @@ def test_frozen_table_keeps_energy_and_island():
     share = delta * v_cap / (v_cap + v_stem)
     captured = np.mean(run.phase_captured[:, 0, 0])
     assert captured == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 4000))
-
-
-@pytest.mark.parametrize(
-    ("name", "phase", "times"),
-    [
-        ("moving-cap", 0.25, [0.25, 0.5, 1, 1.25, 1.5, 2]),
-        ("narrowest at the end", 0.5, [0.5, 1, 1, 1.5, 2, 2]),  # before the end of its cycle
-    ],
-)
-def test_least_nu_is_found(name, phase, times):
-    at_the_end = Mushroom(r=1.0, h=1.0, nu=Fourier(mean=0.6, omega=1.0, cos=(-0.3,)))
-    stops = cycle_stops(load(name) if name == "moving-cap" else at_the_end, 2, (phase,))
-    assert stops.times == pytest.approx(np.array(times) * 2 * np.pi)
-    assert stops.columns.tolist() == [0, -1, 1, 2, -1, 3]
-    assert stops.cycles.tolist() == [-1, -1, 0, -1, -1, 1]
-
-
-def test_mouth_minima_are_times():
-    minima = cycle_stops(load("moving-cap"), 2, (0.25,)).mouth_minima
-    assert minima == pytest.approx(np.array([[np.pi], [3 * np.pi]]), rel=1e-15)
-    assert cycle_stops(load("fixed-cap-anticlockwise"), 1, ()).mouth_minima.tolist() == [[0.375]]
 
 
 def test_progress_reaches_the_end():

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from mpmath import fp
-from support.from_python import from_python
 from support.truth import centre, proved_step
 
 import fast
@@ -19,7 +18,6 @@ import reference
 from conformance.grading.agreement import compare
 from conformance.grading.agreement import exact as enclosed
 from conformance.strategies import scenes_and_states
-from fast.kernel import arithmetic as dd
 from fast.kernel import records
 from fast.kernel.fine_step import fine_path
 from fast.kernel.records import ANCHORS_SHAPE
@@ -37,38 +35,6 @@ WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: se
 # right to 2^-104 of the speed, do not tell the time to the 2^-80 of it that the fine step asks for.
 BRIEF, GRAZING = 2.0**-33, 2.0**-24
 START = State(0.1, 0.2, 0.3, 140.0, 30.0)
-
-
-def exact(a: tuple[float, float]) -> Fraction:
-    return Fraction(float(a[0])) + Fraction(float(a[1]))
-
-
-@pytest.mark.parametrize("seed", range(40))
-@pytest.mark.parametrize("operation", ["add", "sub", "mul", "div"])
-def test_pairs_are_right_to_31_decimals(operation, seed):
-    random = np.random.default_rng(seed)
-    highs, lows = random.normal(size=2), random.normal(size=2) * 2.0**-54
-    if seed % 2:
-        highs[1] = -highs[0] * (1.0 + 2.0 ** -random.integers(1, 52))  # they cancel
-    a, b = (from_python(dd.two_sum)(*ends) for ends in zip(highs, lows * highs, strict=True))
-    truth = {"add": exact(a) + exact(b), "sub": exact(a) - exact(b)}
-    truth |= {"mul": exact(a) * exact(b), "div": exact(a) / exact(b)}
-    error = abs(exact(from_python(getattr(dd, operation))(a, b)) - truth[operation])
-    assert error <= abs(truth[operation]) * Fraction(2) ** -101
-
-
-@pytest.mark.parametrize("angle", [0.0, 1e-20, 0.7, -0.7, 0.8, 1.6, 3.2, -4.7, 1234.5, 2.0**26])
-def test_sine_and_cosine_to_32_decimals(angle):
-    from mpmath import mp
-
-    with mp.workdps(60):
-        truth = mp.sin(mp.mpf(angle)), mp.cos(mp.mpf(angle))
-        *found, is_in_reach = from_python(dd.fine_sine_cosine)((angle, 0.0))
-        assert is_in_reach
-        for a, b in zip(found, truth, strict=True):
-            assert abs(mp.mpf(float(a[0])) + mp.mpf(float(a[1])) - b) <= mp.mpf(2) ** -103 * max(
-                abs(b), 2**-20
-            )
 
 
 def leaves_slowly(scene, state):
@@ -149,14 +115,6 @@ def test_a_path_keeps_its_digits_longer_than_binary64(name):
     same = max(abs(Fraction(a) - b) for a, b in zip(rough.steps[-1, 2:4].tolist(), last[1:3], strict=True))
     assert error <= 1e-18
     assert same > 1e6 * error * max(map(abs, last[1:3]))
-
-
-def test_the_first_collision_is_the_careful_one_to_its_last_bits():
-    scene = load("moving-cap")
-    (row,), found = fast.fine_trajectory(scene, START, 1).steps, fast.next_collision(scene, START, 1e3)
-    assert isinstance(found, Collision)
-    numbers = [found.dt, found.t, found.x, found.y, found.vx, found.vy]
-    assert row[:, 0].tolist() == pytest.approx(numbers, rel=1e-15)
 
 
 @pytest.mark.parametrize("depth", [1e2, 1e4, 1e6])

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import io
-import json
-import math
-
 import numpy as np
 import pytest
 from mpmath import fp
 
 import fast
-from fast import __main__ as served
 from fast import starts
 from fast.ensemble import UNDECIDED
 from scene import (
@@ -28,7 +23,6 @@ from scene import (
     load,
 )
 from scene.geometry import table_at
-from scene.protocol.wire import serve
 
 SCENE = load("moving-cap")
 WALLS = ("arc", "base", "left", "right", "floor")
@@ -44,21 +38,6 @@ def ends(scene, state, t_end, flow=flow_of):
     found, path = flow(scene, state, t_end), fast.trajectory(scene, state, 10_000, t_end)
     assert isinstance(path.outcome, Horizon)
     return [(o.x, o.y, o.vx, o.vy) if isinstance(o, Horizon) else () for o in (found, path.outcome)]
-
-
-@pytest.mark.parametrize("name", ["moving-cap", "breathing-circle", "fermi-ulam", "frozen-mushroom"])
-def test_flow_ends_where_the_trajectory_does(name):
-    scene = load(name)
-    y = -0.3 if name == "fermi-ulam" else 0.3
-    states = [State(0.25 * k, 0.1 - 0.01 * k, y, 25.0 + k, -7.0 * k - 1.0) for k in range(5)]
-    run = fast.flow(scene, states, 2.0)
-    assert run.outcomes == [flow_of(scene, state, 2.0) for state in states]
-    for state, counts in zip(states, run.wall_counts, strict=True):
-        # Chaos multiplies rounding: some tens of hits lose as many bits.
-        found, expected = ends(scene, state, 2.0)
-        assert found == pytest.approx(expected, rel=1e-5, abs=1e-5)
-        path = fast.trajectory(scene, state, 10_000, t_end=2.0)
-        assert counts.tolist() == [path.walls.count(wall) for wall in WALLS]
 
 
 def test_who_gathers_speed_for_ever_is_given_up(monkeypatch):
@@ -140,16 +119,6 @@ def test_a_flow_that_forgets_which_wall_was_met_last_loses_them():
     assert lost_in_slow_caps(forgetful, 60) > 5
 
 
-def test_starts_on_walls_are_taken_as_given():
-    """From a wall, the flow goes on as the trajectory did."""
-    path = fast.trajectory(SCENE, STARTS[0], 6)
-    states = [State(*map(float, row[1:]), wall) for wall, row in zip(path.walls, path.steps, strict=True)]
-    t_end = states[-1].t + 0.5
-    ends = [(o.x, o.y, o.vx, o.vy) for o in fast.flow(SCENE, states, t_end).outcomes]
-    for end in ends:
-        assert end == pytest.approx(ends[-1], rel=1e-6, abs=1e-6)
-
-
 def test_the_first_captured_stay():
     """Frozen: a particle in the island stays from its first arc hit on; one through the mouth has no stay."""
     scene = load("frozen-mushroom")
@@ -185,29 +154,6 @@ def test_what_is_lost_on_the_way_says_why():
 def test_nothing_to_follow():
     assert fast.flow(SCENE, [], 1.0).outcomes == []
     assert isinstance(fast.flow(SCENE, [State(1.0, 0.1, 0.2, 1.0, 0.0)], 1.0).outcomes[0], Horizon)
-
-
-def test_protocol_1_serves_flow_and_time():
-    scene = {"table": "mushroom", "r": 1.0, "nu": 0.5, "h": 1.0, "slope": 0.1}
-    good = {"t": 0.0, "x": 0.8, "y": 0.1, "vx": 0.1, "vy": 3.0}
-    lines = [
-        {"cmd": "flow", "seq": 1, "scene": scene, "states": [good, {**good, "x": 5.0}], "t_end": 9.0},
-        {"cmd": "time", "seq": 2, "scene": scene, "state": good, "collisions": 30, "repeat": 3},
-    ]
-    out = io.BytesIO()
-    text = "\n".join(map(json.dumps, lines)).encode()
-    step, steps = fast.next_collision, served.follow
-    serve("fast", step, steps, io.BytesIO(text), out, flow=served.carry, timer=served.clock)
-    flown, timed = map(json.loads, out.getvalue().splitlines())
-    assert [state["outcome"] for state in flown["states"]] == ["horizon", "rejected"]
-    begin, end = flown["states"][0]["captured"]
-    assert 0.0 < begin < end == 9.0
-    assert flown["states"][1]["captured"] is None
-    assert len(timed["ns"]) == 3
-    assert min(timed["ns"]) > 0
-    last = steps(load("frozen-mushroom"), State(**good), 30, math.inf)[-1]
-    assert not isinstance(last, Rejected)
-    assert timed["steps"][0]["outcome"] == "collision"
 
 
 def drawn(n, energy):

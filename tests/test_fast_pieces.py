@@ -118,19 +118,6 @@ def test_pieces_of_waves_that_are_rounded_where_they_cancel_are_seen(scene, monk
     assert worst_errors(scene, np.random.default_rng(1), 40)[0] > 100 * 2.0**-53
 
 
-def test_every_flight_that_begins_in_a_piece_has_room_there():
-    """What a piece serves is at most what it holds; pieces follow each other round the period."""
-    for scene in DEEP:
-        p = laws_in_lanes(scene).pieces
-        ends = np.append(p.begins[1:], p.period)
-        middle = p.references[:, 0] + p.references[:, 1] - p.origin
-        assert p.begins[0] == 0.0
-        assert (np.diff(p.begins) > 0.0).all()
-        assert np.allclose(middle - p.limits, p.begins, rtol=0, atol=1e-15 * p.period)
-        assert (middle + p.limits >= ends - 1e-15 * p.period).all()
-        assert np.allclose(p.serves, ends - middle, rtol=0, atol=1e-15 * p.period)
-
-
 def test_degrees_are_no_higher_than_it_takes():
     assert [laws_in_lanes(scene).degree for scene in DEEP] == [SERIES] * 4 + [PARABOLA]
     assert len(laws_in_lanes(Cap(r=Fourier(1.0, 1.0, (0.8,)))).pieces.begins) >= 27

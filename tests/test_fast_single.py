@@ -14,6 +14,7 @@ import fast
 from fast import step as stepper
 from fast.kernel import records
 from fast.kernel.single import REFUSED
+from fast.units import fit
 from scene import (
     BadInput,
     Cap,
@@ -47,6 +48,7 @@ Question = tuple[Scene, State, float]
 def by_a_path(scene: Scene, state: State, t_end: float) -> Outcome | None:
     """Answer as `next_collision`, with checks in Python and the careful step of trajectories."""
     try:
+        fit(scene)
         check_numbers(scene, state, t_end)
         path = fast.trajectory(scene, state, 1, t_end)
     except BadInput as error:
@@ -115,7 +117,6 @@ def test_a_kernel_that_overlooks_the_wall_is_found(monkeypatch):
         return single(*question[:-2], int(records.NO_WALL), question[-1]) if found[0] == REFUSED else found
 
     monkeypatch.setattr(stepper.single, "single_at_once", lambda: lenient)
-    monkeypatch.setattr(stepper, "latest", [None])
     assert differing(1, 300)
 
 
@@ -130,25 +131,6 @@ def test_a_horizon_of_zero_is_no_late_one(monkeypatch):
     latest = np.finfo(np.float64).max
     monkeypatch.setattr(stepper.Units, "horizon", lambda units, t_end: t_end or latest)
     assert by_a_path(*small, 0.0) != fast.next_collision(*small, 0.0)
-
-
-def test_scenes_that_come_and_go_are_not_mistaken(monkeypatch):
-    """Scenes made for one question each often get the address of the one before."""
-    state, radii = State(0.0, 0.0, 0.5, 1.0, 0.0), [1.0 + i / 64 for i in range(600)]
-
-    def met():
-        return [fast.next_collision(Cap(r=r), state, 99.0).x for r in radii]
-
-    expected = [pytest.approx(math.sqrt(r * r - 0.25), rel=1e-15, abs=0.0) for r in radii]
-    assert met() == expected
-    fit, kept = stepper.fit, {}
-
-    def by_address(scene):
-        return kept[id(scene)] if id(scene) in kept else kept.setdefault(id(scene), fit(scene))
-
-    monkeypatch.setattr(stepper, "fit", by_address)
-    fit.cache_clear()  # it holds scenes, and so their addresses
-    assert met()[300:] != expected[300:]
 
 
 class Marked(State, frozen=True):
@@ -174,14 +156,10 @@ AT = {"t": 0.0, "x": 0.25, "y": 0.5, "vx": 1.0, "vy": 0.5}
         (None, False),
     ],
 )
-def test_a_scene_asked_before_takes_no_other_states(state, is_taken, monkeypatch):
-    scene = load("moving-cap")
-    scene = Cap(r=scene.r)
-    expected = fast.next_collision(scene, State(**AT), 9.0)
-    for before in (stepper.latest, [None]):
-        monkeypatch.setattr(stepper, "latest", before)
-        found = fast.next_collision(scene, state, 9.0)
-        assert found == expected if is_taken else isinstance(found, Rejected)
+def test_states_of_other_types_are_taken_or_refused(state, is_taken):
+    scene = Cap(r=load("moving-cap").r)
+    found = fast.next_collision(scene, state, 9.0)
+    assert found == fast.next_collision(scene, State(**AT), 9.0) if is_taken else isinstance(found, Rejected)
 
 
 def test_threads_may_ask_side_by_side():

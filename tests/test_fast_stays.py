@@ -102,34 +102,6 @@ def test_stays_are_those_of_the_definition(name, tally):
     assert tally["slots filled"] > 30
 
 
-def test_a_stay_over_both_narrowings_stands_in_both_slots():
-    """Captured above the peak between them: released after the second. Below it: let out at the peak."""
-    run = fast.simulate(MOUTHS["unequal"], n_particles=400, energy=1e3, seed=1)
-    peak = 0.73  # of nu, at t = pi
-    (first, second), (first_end, second_end) = run.t_in[:, 0].T, run.t_out[:, 0].T
-    both = np.isfinite(first) & (first == second)
-    apart = np.isfinite(first) & np.isfinite(second) & ~both
-    assert min(both.sum(), apart.sum()) > 10
-    assert np.array_equal(first_end[both], second_end[both])
-    assert np.all(first_end[apart] < second[apart])
-    nu = 0.6 + 0.12 * np.cos(first) + 0.25 * np.cos(2 * first)
-    delay = 4 / np.sqrt(2 * 1e3)  # nu is known to O(1/v)
-    assert np.quantile(nu[both], 0.1) > peak - delay
-    assert np.quantile(nu[apart], 0.9) < peak + delay
-
-
-def test_a_narrowing_at_the_cycle_s_end_belongs_to_it():
-    """A stay begun before the end is cut there; in the next cycle it goes on, and counts no more."""
-    span = 2 * np.pi
-    run = fast.simulate(AT_THE_END, n_particles=300, energy=1e3, n_cycles=2, seed=1)
-    for cycle in range(2):
-        captured = run.is_captured()[:, cycle]
-        assert 0.2 < captured.mean() < 0.9
-        assert np.all(run.t_out[captured, cycle, 0] == span * (cycle + 1.0))
-    stays = run.t_in[run.takes_part() & run.is_captured()[:, 1], 1, 0]
-    assert np.mean(stays > span) > 0.99
-
-
 def test_a_mouth_that_stands_still_captures_nobody():
     run = fast.simulate(load("frozen-mushroom"), n_particles=50, energy=100.0)
     assert run.t_in.shape == (50, 1, 0)

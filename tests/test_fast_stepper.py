@@ -1,12 +1,8 @@
-"""The fast step: its building blocks against mpmath, and what it does not guess."""
+"""The fast step: what it does not guess, and what it got wrong once."""
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from mpmath import mp, workprec
 from support.from_python import from_python
 from support.tables import CIRCLE, STATIC
 from support.truth import proved_step
@@ -15,13 +11,9 @@ import fast
 import reference
 from conformance.grading.agreement import compare
 from fast.kernel import arithmetic
-from fast.kernel.laws import increment, set_anchors
-from fast.kernel.records import ANCHORS_SHAPE, DEPTH, VALUE
-from fast.units import compile_scene
 from scene import (
     BangBang,
     Cap,
-    Collision,
     Fourier,
     Horizon,
     Mushroom,
@@ -29,46 +21,7 @@ from scene import (
     Stem,
     Undecided,
     Undefined,
-    load,
 )
-from scene.laws import value
-from scene.tables import laws
-
-
-@given(st.floats(1e-3, 1e3), st.integers(1, 16), st.floats(-1e5, 1e5), st.floats(-1e-12, 1e-12))
-def test_sine_and_cosine(omega, k, t, t_low):
-    s, s_low, c, c_low, is_reduced = from_python(arithmetic.sine_cosine)(omega, 0.0, float(k), t, t_low)
-    with workprec(200):
-        phase = k * mp.mpf(omega) * (mp.mpf(t) + mp.mpf(t_low))
-        if not is_reduced:
-            assert abs(phase) > 2.0**26
-            return
-        # Relative to the value itself, up to the phase's own rounding near multiples of pi and
-        # the spacing of subnormal numbers.
-        least = abs(phase) * 2.0**-100 + (k + 1) * mp.mpf(2) ** -1074
-        assert abs(s - mp.sin(phase)) <= 2.0**-52 * abs(mp.sin(phase)) + least
-        assert abs(c - mp.cos(phase)) <= 2.0**-52 * abs(mp.cos(phase)) + least
-        # With their low parts a few more bits, absolutely.
-        assert abs(s + mp.mpf(s_low) - mp.sin(phase)) <= 2.0**-55 + abs(phase) * 2.0**-100
-        assert abs(c + mp.mpf(c_low) - mp.cos(phase)) <= 2.0**-55 + abs(phase) * 2.0**-100
-
-
-@pytest.mark.parametrize("name", ["fixed-cap-clockwise", "moving-cap", "fermi-ulam"])
-@given(t=st.floats(-20, 20), s=st.floats(1e-12, 5))
-def test_increments_of_laws(name, t, s):
-    scene = load(name)
-    compiled = compile_scene(scene)
-    anchors = np.zeros(ANCHORS_SHAPE)
-    assert from_python(set_anchors)(compiled.laws, anchors, t, 0.0)
-    with workprec(200):
-        law, then = laws(scene)["h"], mp.mpf(t) + mp.mpf(s)
-        change, rate, size, _ = from_python(increment)(compiled.laws, anchors, DEPTH, s)
-        exact = value(mp, law, then) - value(mp, law, mp.mpf(t))
-        # Small increments keep their relative accuracy: 16 roundings of the summed terms, and
-        # the rounding of a knot's time by one unit in the last place, at speeds up to 32.
-        assert abs(change - exact) <= 16 * 2.0**-53 * size + 2.0**-52 * 64 * s
-        assert abs(rate - value(mp, law, then, 1)) <= 2.0**-53 * 4096
-        assert abs(anchors[DEPTH, VALUE] - value(mp, law, mp.mpf(t))) <= 2.0**-50 * 6
 
 
 @pytest.mark.parametrize(
@@ -82,19 +35,6 @@ def test_increments_of_laws(name, t, s):
 )
 def test_what_it_does_not_guess(scene, state, expected):
     assert fast.next_collision(scene, state, 100.0) == expected
-
-
-def test_trajectory_repeats_the_steps():
-    scene, state = load("moving-cap"), State(0.0, 0.1, 0.3, 20.0, 7.0)
-    path = fast.trajectory(scene, state, 50)
-    assert path.outcome is None
-    for wall, row in zip(path.walls, path.steps, strict=True):
-        step = fast.next_collision(scene, state, state.t + 10)
-        assert isinstance(step, Collision)
-        assert step.wall == wall
-        # The trajectory carries time as a pair; a single step sees it rounded.
-        assert row[1:] == pytest.approx((step.t, step.x, step.y, step.vx, step.vy), rel=1e-11, abs=1e-11)
-        state = State(*map(float, row[1:]), wall)
 
 
 def test_rising_from_beside_the_mouths_edge_needs_no_decision():

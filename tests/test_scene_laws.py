@@ -144,23 +144,6 @@ def test_derivatives_are_limits_of_differences(law, t):
         assert abs(slope - value(ctx, law, time, order + 1)) <= size * step
 
 
-@given(moving, times)
-def test_a_piece_agrees_with_the_law_until_its_end(law, t):
-    piece = piece_at(law, Fraction(t))
-    if not isinstance(piece, Quadratic):
-        assert piece == law
-        return
-    ctx = context(60)
-    after = piece_at(law, piece.end)
-    assert piece.end > Fraction(t)
-    end = exact(ctx, piece.end)
-    tiny = ctx.mpf(2) ** -150
-    for order in (0, 1):
-        assert abs(evaluate(ctx, piece, end, order) - evaluate(ctx, after, end, order)) < tiny
-    inside = (Fraction(t) + piece.end) / 2
-    assert piece_at(law, inside) == piece
-
-
 @given(laws(), st.floats(-8.0, 8.0), st.floats(0.0, 2.0**-6))
 def test_intervals_enclose_points(law, t, width):
     iv = MPIntervalContext()

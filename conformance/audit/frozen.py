@@ -161,7 +161,7 @@ def lag(
     now = table_at(fp, scene, t)
     found = passages(scene, now, t, speed, n, random)
     table, share = swaying(scene, t, SWAY_PERIOD * TAIL)
-    done = carry(table, found.states, [None] * len(found.states), TAIL, 1)
+    done, _ = carry(table, found.states, [None] * len(found.states), TAIL, 1)
     ends = [o.vx**2 + o.vy**2 if isinstance(o, Horizon) else math.nan for o in done.outcomes]
     length = found.path + TAIL
     excess = np.log(ends) / share + found.arcs * now.r_rate - kick_rate(scene, t) * length

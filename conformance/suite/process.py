@@ -122,7 +122,7 @@ def _table() -> Iterator[_Entry]:
 
 MAX_LINE = 2**24  # bytes of one answer: a trajectory of 10^5 collisions
 MAX_STDERR = 2**15  # bytes kept of the first and of the last that it wrote there
-GRACE = 1.0  # seconds between the end of its output and its exit, and between its exit and its helpers'
+GRACE = 1.0  # seconds between the end of its output and its exit; decides a message only
 POLL = 0.05  # seconds between looks at a silent process: a child of it may hold the pipe when it is gone
 # What calculating with numbers of a nonsense answer may raise, however a formula is written.
 NOT_NUMBERS = (ArithmeticError, ValueError)
@@ -193,6 +193,9 @@ class Process:
         self._stdin, self._stdout, self._stderr = stdin, stdout, stderr_pipe
         for stream in (stdin, stdout, stderr_pipe):
             os.set_blocking(stream.fileno(), False)
+        self._selector = selectors.DefaultSelector()
+        for stream in (stdout, stderr_pipe):
+            self._selector.register(stream, selectors.EVENT_READ)
         self._transcript = stderr
         self._received = bytearray()
         self._is_open = True  # its standard output
@@ -231,7 +234,7 @@ class Process:
         return answer
 
     def finish(self, line: bytes, timeout: float) -> None:
-        """Write a last line and see the process end by itself, silently.
+        """Write a last line and see the process and its children end by themselves, silently.
 
         Raises:
             CheckFailure: wrong-format for further output, timed-out, crashed; fail for a process left behind.
@@ -251,7 +254,7 @@ class Process:
         if status := self._status():
             raise CheckFailure("crashed", f"{status} after `stop`")
         # A helper that ends because the process has ended does so a little later.
-        if not _comes_true(lambda: not self._descendants.alive()):
+        if not _comes_true(lambda: not self._descendants.alive(), deadline):
             raise CheckFailure("fail", "left a child process running after `stop`")
         self._advance(b"", 0.0)
         self._check_silence()  # of the helpers
@@ -261,6 +264,7 @@ class Process:
         if self._child.returncode is None:
             self._descendants.kill()
             self._child.wait()
+        self._selector.close()
         for stream in (self._stdin, self._stdout, self._stderr):
             with contextlib.suppress(OSError):
                 stream.close()
@@ -271,24 +275,23 @@ class Process:
 
     def _advance(self, pending: bytes, timeout: float) -> bytes:
         # One look at all pipes; returns what is still to be written.
-        with selectors.DefaultSelector() as selector:
-            if self._is_open:
-                selector.register(self._stdout, selectors.EVENT_READ)
-            if not self._stderr.closed:
-                selector.register(self._stderr, selectors.EVENT_READ)
-            if pending:
-                selector.register(self._stdin, selectors.EVENT_WRITE)
-            for key, _ in selector.select(timeout):
-                if key.fileobj is self._stdin:
-                    pending = self._write(pending)
-                elif key.fileobj is self._stdout:
-                    data = self._stdout.read(2**20)
-                    self._received += data or b""
-                    self._is_open = data != b""
-                elif data := self._stderr.read(2**20):
-                    self._transcript.add(data)
-                else:
-                    self._stderr.close()
+        is_pending = bool(pending)
+        if is_pending:
+            self._selector.register(self._stdin, selectors.EVENT_WRITE)
+        for key, _ in self._selector.select(timeout):
+            if key.fileobj is self._stdin:
+                pending = self._write(pending)
+                continue
+            data = key.fileobj.read(2**20)  # type: ignore[union-attr]
+            if data == b"":
+                self._selector.unregister(key.fileobj)
+            if key.fileobj is self._stdout:
+                self._received += data or b""
+                self._is_open = data != b""
+            elif data:
+                self._transcript.add(data)
+        if is_pending:
+            self._selector.unregister(self._stdin)
         return pending
 
     def _write(self, pending: bytes) -> bytes:
@@ -322,14 +325,13 @@ class Process:
             return f"was killed by signal {result.si_status}"
 
     def _ending(self) -> str:
-        if not _comes_true(self._has_exited):
+        if not _comes_true(self._has_exited, time.monotonic() + GRACE):
             return "closed its standard output"
         return (self._status() or "exited with status 0") + " before it answered"
 
 
-def _comes_true(condition: Callable[[], bool]) -> bool:
-    """Wait a little for something to be so, and tell whether it is."""
-    deadline = time.monotonic() + GRACE
+def _comes_true(condition: Callable[[], bool], deadline: float) -> bool:
+    """Wait for something to be so until the deadline, and tell whether it is."""
     while not (is_so := condition()) and time.monotonic() < deadline:
         time.sleep(POLL / 5)
     return is_so

@@ -27,14 +27,14 @@ from scene.refusal import BadInput
 AnswerLine = Callable[[bytes], bytes]
 T = TypeVar("T")
 MAX_SEQ = 2**31 - 1  # the integers of every language
-STOP_TIMEOUT = 5.0  # seconds to exit after `stop`
 
 
 class Limits(msgspec.Struct, frozen=True):
     """What a session puts up with.
 
     Attributes:
-        timeout: seconds for one answer, start-up and just-in-time compilation included.
+        timeout: seconds for one answer, start-up and just-in-time compilation included; also for the end
+            after `stop`.
         restarts: fresh processes after the first.
         total: seconds for the whole session, restarts included; None for as long as it takes.
     """
@@ -173,7 +173,7 @@ class Session(AbstractContextManager["Session"]):
             self._check_time()
             raise self._end or CheckFailure("error", "not asked: no process was left")
         try:
-            process.finish(msgspec.json.encode({"cmd": "stop"}), min(STOP_TIMEOUT, self.limits.timeout))
+            process.finish(msgspec.json.encode({"cmd": "stop"}), self.limits.timeout)
         finally:
             process.kill()
 

@@ -287,9 +287,6 @@ def fine_sine_cosine(angle):
         r = add(r, two_product(-n, HALF_PI[k]))
     z = mul(r, r)
     sine, cosine = series(r, z, 1), series(r, z, 0)
-    quarter = n - 4.0 * np.floor(0.25 * n)
-    if quarter == 1.0 or quarter == 3.0:
-        sine, cosine = cosine, (-sine[0], -sine[1])
-    if quarter >= 2.0:
-        sine, cosine = (-sine[0], -sine[1]), (-cosine[0], -cosine[1])
-    return sine, cosine, abs(n) < MAX_QUADRANT
+    s, c = turned(n, sine[0], cosine[0])
+    s_low, c_low = turned(n, sine[1], cosine[1])
+    return (s, s_low), (c, c_low), abs(n) < MAX_QUADRANT

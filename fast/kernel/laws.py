@@ -27,6 +27,7 @@ from fast.kernel.arithmetic import (
     fine_sine_cosine,
     mul,
     sine_cosine,
+    sub,
     times,
     two_product,
     two_sum,
@@ -232,7 +233,7 @@ def set_leg(laws, anchors, row, t_hi, t_lo):
     length, length_low = two_sum(after, -before)
     a, a_low = laws[row, KNOTS + 2 * n + i], laws[row, KNOTS + 3 * n + i]
     u, u_low = time_since(before, n_periods, period, period_low, t_hi, t_lo)
-    room, room_low = difference(0.5 * length, 0.5 * length_low, u, u_low)
+    room, room_low = sub((0.5 * length, 0.5 * length_low), (u, u_low))
     if room > 0.0:
         f, f_low, rate = on_parabola(laws[row, KNOTS + n + i], a, a_low, u, u_low)
         anchors[row, HALF_LEG] = 2.0 * i
@@ -245,15 +246,6 @@ def set_leg(laws, anchors, row, t_hi, t_lo):
     anchors[row, RATE] = rate
     anchors[row, ROOM], anchors[row, ROOM_LOW] = room, room_low
     return True
-
-
-@kernel
-def difference(a, a_low, b, b_low):
-    """Return (a + a_low) - (b + b_low) as a sum of two floats, right relative to itself."""
-    d, e = two_sum(a, -b)
-    low, f = two_sum(a_low, -b_low)
-    d, e = two_sum(d, e + low)
-    return two_sum(d, e + f)
 
 
 @kernel
@@ -298,20 +290,6 @@ def bend_of_half_leg(laws, row, j):
     return -a if j % 2 else a
 
 
-@part
-def whole_periods_off(laws, row, s):
-    """Return s less the whole periods in it, as a sum of two floats."""
-    period, period_low = laws[row, PERIOD], laws[row, PERIOD_LOW]
-    if s < period:
-        return s, 0.0
-    n_periods = np.floor(s / period)
-    p, e = two_product(n_periods, period)
-    left, left_low = difference(s, 0.0, p, e + n_periods * period_low)
-    if left < 0.0:  # the quotient was rounded up
-        left, left_low = difference(left, left_low, -period, -period_low)
-    return left, left_low
-
-
 @kernel
 def leg_after(laws, anchors, row, s):
     """Walk the half-legs of a bang-bang law for a time s.
@@ -323,9 +301,11 @@ def leg_after(laws, anchors, row, s):
     j = int(anchors[row, HALF_LEG])
     room, room_low = anchors[row, ROOM], anchors[row, ROOM_LOW]
     rate, change, size, beyond = anchors[row, RATE], 0.0, 0.0, 0.0
-    left, left_low = whole_periods_off(laws, row, s)
+    period, period_low = laws[row, PERIOD], laws[row, PERIOD_LOW]
+    n_periods, _ = whole_periods(0.0, period, period_low, s, 0.0)
+    left, left_low = time_since(0.0, n_periods, period, period_low, s, 0.0)
     for _ in range(n_half_legs + 1):
-        beyond, beyond_low = difference(left, left_low, room, room_low)
+        beyond, beyond_low = sub((left, left_low), (room, room_low))
         if beyond < 0.0:
             break
         a = bend_of_half_leg(laws, row, j)

@@ -204,6 +204,7 @@ HONEST = (
     "whole-numbers-with-a-point",
     "lines-as-windows-ends-them",
     "helper-that-ends-later",
+    "slow-to-stop",
     "last-words",
 )
 CONTROLS = "\x1b]0;owned\x07\x1b[2J\r\x9b31m\u202e\u2028\x00"  # for terminals, and what XML cannot hold
@@ -277,6 +278,7 @@ FAULTS: dict[str, tuple[str, Act]] = {
     "hang": ("step", sleep),
     "hang-at-start": ("start", sleep),
     "ignore-stop": ("stop", sleep),
+    "slow-to-stop": ("stop", then(wait(6.0), leave(0))),  # as machine code that is freed on a busy machine
     "late-answer": ("step", then(wait(3.0), say)),
     "slow": ("step", then(wait(0.7), say)),
     "ignore-sigterm": ("step", then(ignore_termination, sleep)),

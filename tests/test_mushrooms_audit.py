@@ -35,7 +35,6 @@ from mushrooms.store import conduct
 from mushrooms.store.run import StoredRun, attributes_of
 
 pytestmark = pytest.mark.usefixtures("unsynced")
-CHEAP = "M4,M10,X5,N6"
 FIGURES = ("X1", "X5", "L4")
 EVERY_FIGURE = tuple(sorted({picture.claim for picture in by_claim.ALL}))
 
@@ -117,17 +116,6 @@ def test_the_summary_tells_what_is_not_as_expected(everything):
     assert f"{len(findings) - 1} of {len(findings)} claims" in text
 
 
-@pytest.mark.deep
-def test_a_few_claims_are_checked_and_reported(call, tmp_path):
-    done = call("--only", CHEAP, "--out", tmp_path / "a", "--json")
-    data = done.data()
-    assert [finding["id"] for finding in data["findings"]] == CHEAP.split(",")
-    assert {claim["name"] for claim in data["runs"]} == {"ergodic@1e6", "ergodic@1e7"}
-    names = sorted(claim.name for claim in (tmp_path / "a").iterdir())
-    assert names == ["findings", "report.html", "report.json", "report.txt", "runs"]
-    assert (tmp_path / "a" / "report.json").read_text("utf-8") == done.out
-
-
 def test_a_failed_claim_exits_with_1(call, tmp_path, monkeypatch):
     def warmed(scene, **options):
         paused = adiabatic_particles.go_on(scene, **options)
@@ -166,22 +154,31 @@ def test_a_broken_off_audit_goes_on(call, tmp_path, blocks):
     assert call("--only", "X5", "--out", tmp_path).code == 130
     fresh = call("--only", "X5", "--out", tmp_path, "--resume", "--json").data()
     assert len(blocks) == len(set(blocks)) + 1 == 7  # two runs of three blocks
+    assert [finding["id"] for finding in fresh["findings"]] == ["X5"]
+    assert {run["name"] for run in fresh["runs"]} == {"ergodic@1e6", "ergodic@1e7"}
+    assert json.loads((tmp_path / "report.json").read_text("utf-8")) == fresh
+    names = ["findings", "report.html", "report.json", "report.txt", "runs"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
     again = call("--only", "X5", "--out", tmp_path, "--resume", "--json").data()
     assert len(blocks) == 7
     assert again["runs"] == fresh["runs"]
     assert again["findings"] == fresh["findings"]
 
 
-def test_another_seed_is_refused_and_broken_findings_are_made_again(call, tmp_path, blocks):
+def test_no_run_is_replaced_and_broken_findings_are_made_again(call, tmp_path, blocks):
     call("--only", "X5", "--out", tmp_path)
     before = held(tmp_path)
-    refused = call("--only", "X5", "--out", tmp_path, "--resume", "--seed", 1)
-    assert_refused(refused, "holds another run: seed = ", " there, ", "asked for", "ergodic@1e7")
-    assert held(tmp_path) == before
+    for more, words in (
+        (["--resume", "--seed", 1], ["holds another run: seed = ", " there, ", "asked for", "ergodic@1e7"]),
+        ([], [str(tmp_path / "runs" / "ergodic@1e7"), "--resume takes it up"]),
+    ):
+        assert_refused(call("--only", "X5", "--out", tmp_path, *more), *words)
+        assert held(tmp_path) == before
     for path in (tmp_path / "findings").iterdir():
         content = path.read_bytes()
         path.write_bytes(content[:90] + bytes([content[90] ^ 1]) + content[91:])
     assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
+    assert call("--only", "N6", "--out", tmp_path).code == 0  # it has no runs
     assert len(blocks) == 6
 
 
@@ -270,16 +267,6 @@ def test_one_audit_holds_a_folder(call, tmp_path):
     with locked(tmp_path):
         assert_refused(call("--only", "M3", "--out", tmp_path), "one run at a time")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_without_resume_no_run_is_replaced(call, tmp_path, blocks):
-    call("--only", "X5", "--out", tmp_path)
-    before = held(tmp_path)
-    refused = call("--only", "X5", "--out", tmp_path)
-    assert_refused(refused, str(tmp_path / "runs" / "ergodic@1e7"), "--resume takes it up")
-    assert held(tmp_path) == before
-    assert call("--only", "N6", "--out", tmp_path).code == 0  # it has no runs
-    assert len(blocks) == 6
 
 
 SMALL = {

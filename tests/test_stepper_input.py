@@ -160,11 +160,13 @@ SWEPT_ONCE = Cap(r=BangBang(knots=((0.0, 1.0), (1.0, 0.5), (2.0, 1.0))))
 
 def test_what_rests_and_is_never_swept_stays_where_it_is():
     """Without a horizon: at t = infinity in its place, the same for all entries; no nan."""
-    expected = Horizon(math.inf, 0.0, 0.5, 0.0, 0.0)
-    assert fast.trajectory(CAP, RESTING, 3).outcome == expected
-    assert fast.trajectory(CAP, RESTING, 3, math.inf).outcome == expected
-    assert fast.fine_trajectory(CAP, RESTING, 3).outcome == expected
-    assert careful_steps(CAP, [RESTING])[0] == [expected]
+    found = [
+        fast.trajectory(CAP, RESTING, 3).outcome,
+        fast.trajectory(CAP, RESTING, 3, math.inf).outcome,
+        fast.fine_trajectory(CAP, RESTING, 3).outcome,
+        *careful_steps(CAP, [RESTING])[0],
+    ]
+    assert found == [Horizon(math.inf, 0.0, 0.5, 0.0, 0.0)] * 4
     assert fast.trajectory(CAP, RESTING, 3, 7.0).outcome == Horizon(7.0, 0.0, 0.5, 0.0, 0.0)
     assert fast.trajectory(CAP, RESTING, 0).outcome is None
 

@@ -408,7 +408,7 @@ def test_workers_may_die(command_line, tmp_path, ensemble, monkeypatch):
     [
         (distributed.comm.CommClosedError("closed"), "the scheduler has gone (CommClosedError)"),
         (RuntimeError("Error during deserialization of the task graph"), "must have this project"),
-        (distributed.KilledWorker("follow", None, 0), "workers die of a block"),
+        (distributed.KilledWorker("follow", None, 0), "workers die of block"),
     ],
 )
 def test_a_lost_cluster_is_one_line_that_says_how_to_go_on(

@@ -13,6 +13,7 @@ import math
 import shutil
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import closing
@@ -33,7 +34,7 @@ from scene import BadInput
 OnProgress = Callable[[int], None]
 Following = Generator[tuple[BlockRange, Block], None, None]
 Engine = Callable[[RunSpec, Iterator[BlockRange], OnProgress], Following]
-RETRIES = 10  # of a block whose worker fails; Dask itself gives it to others when workers die
+RETRIES = 10  # of a block whose workers fail or die
 BLOCKS_AHEAD = 2  # waiting for each thread of the cluster: no worker idles, and few blocks are in memory
 CONNECT_TIMEOUT = 10.0  # seconds in which a scheduler must answer
 POLL_INTERVAL = 0.5  # seconds after which limits are looked at while no block comes
@@ -106,7 +107,7 @@ def by_dask(
         ConnectionError: the cluster is lost.
     """
     try:
-        from distributed import Client, KilledWorker
+        from distributed import Client
         from distributed.comm import CommClosedError, resolve_address
     except ImportError:
         raise BadInput("--dask needs dask.distributed: pip install 'oscillating-mushrooms[scale]'") from None
@@ -127,8 +128,6 @@ def by_dask(
     except (CancelledError, CommClosedError) as error:
         why = type(error).__name__
         raise ConnectionError(f"--dask = {address}: the scheduler has gone ({why})") from None
-    except KilledWorker:
-        raise ConnectionError(f"--dask = {address}: workers die of a block again and again") from None
     except RuntimeError as error:
         if "deserialization" not in str(error):
             raise
@@ -141,16 +140,20 @@ def _hand_out(
     client: Any, spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress, threads: int
 ) -> Following:
     """Keep every worker busy, and yield what comes back; what is still out is dropped at the end."""
-    from distributed import wait
+    from distributed import KilledWorker, wait
 
-    out = dict[Any, BlockRange]()
+    out, n_killed = dict[Any, BlockRange](), Counter[int]()
+
+    def submit(block_range: BlockRange) -> None:
+        asked_for = (mushrooms.__version__, spec, block_range, threads)
+        options = {"pure": False, "retries": RETRIES, "priority": -block_range.number}
+        out[client.submit(follow_elsewhere, *asked_for, **options)] = block_range
+
     try:
         while True:
             n_wanted = max(1, BLOCKS_AHEAD * sum(client.nthreads().values())) - len(out)
             for block_range in islice(block_ranges, max(0, n_wanted)):
-                asked_for = (mushrooms.__version__, spec, block_range, threads)
-                options = {"pure": False, "retries": RETRIES, "priority": -block_range.number}
-                out[client.submit(follow_elsewhere, *asked_for, **options)] = block_range
+                submit(block_range)
             if not out:
                 return
             on_progress(0)
@@ -160,7 +163,19 @@ def _hand_out(
             except TimeoutError:
                 continue
             for future in done:
-                yield out.pop(future), future.result()
+                block_range = out.pop(future)
+                try:
+                    block = future.result()
+                except KilledWorker:
+                    # So many workers died with it that the scheduler gave it up; it may not be its fault.
+                    n_killed[block_range.number] += 1
+                    if n_killed[block_range.number] > RETRIES:
+                        raise ConnectionError(
+                            f"--dask: workers die of block {block_range.number} again and again"
+                        ) from None
+                    submit(block_range)
+                    continue
+                yield block_range, block
     finally:
         client.cancel(list(out))
 

@@ -24,16 +24,13 @@ def print_scenes(name: str, as_toml: bool, as_json: bool) -> None:
         raise BadInput("--toml and --json: must be one of them")
     if as_toml and not name:
         raise BadInput(f"--toml needs NAME, one of {', '.join(scenes.catalogue())}")
-    if name:
-        data = scenes.to_data(SCENES[name]) if name in SCENES else None
-        if as_json:
-            print(json.dumps(data or read_data(name), indent=2, ensure_ascii=False))
-        else:
-            print((_toml(data) if data else catalogue_text(name)).rstrip("\n"))
+    of_audit = scenes.to_data(SCENES[name]) if name in SCENES else None
+    if name and not as_json:
+        print((_toml(of_audit) if of_audit else catalogue_text(name)).rstrip("\n"))
         return
-    rows = [_catalogue_row(name) for name in scenes.catalogue()]
+    rows = [] if name else [_catalogue_row(each) for each in scenes.catalogue()]
     if as_json:
-        print(json.dumps(rows, indent=2, ensure_ascii=False))
+        print(json.dumps(rows or of_audit or read_data(name), indent=2, ensure_ascii=False))
         return
     table = Table("name", "table", "period", "notes", title="Catalogue")
     for row in rows:

@@ -217,27 +217,3 @@ def test_43_signs_of_zero_do_not_matter(state):
                 for found in (answer, reference.next_collision(scene, start, 9.0).rounded()):
                     outcomes.add((found.wall, *bits(found)))
     assert len(outcomes) == 1
-
-
-@pytest.mark.parametrize("index", [1, 3, 5])
-def test_44_laws_that_move_by_nothing_stand_still(index):
-    names = f"44/{index}", f"44/{index + 1}"
-    one, two = (fast_path(name, 300) for name in names)
-    assert one.walls == two.walls
-    assert one.steps.tobytes() == two.steps.tobytes()
-    first, second = (proved_path(name, 1).steps[0].rounded() for name in names)
-    assert first == second
-
-
-def test_44_speed_in_a_static_box():
-    path = fast_path("44/1", 10_000)
-    assert set(np.abs(path.steps[:, 4])) == {0.7}
-    assert set(np.abs(path.steps[:, 5])) == {0.3}
-
-
-def test_44_speed_in_a_static_circle():
-    """(vx, vy) are rounded at each bounce off the arc, so v is kept within rounding there."""
-    path = fast_path("44/3", 10_000)
-    v2 = path.steps[:, 4] ** 2 + path.steps[:, 5] ** 2
-    drift = np.abs(v2 / (0.7**2 + 0.3**2) - 1.0)
-    assert np.all(drift <= 8 * 2.0**-53 * np.arange(2, 10_002))

@@ -43,13 +43,6 @@ def test_a_fourier_law_is_its_sum():
     assert value(fp, law, t) == pytest.approx(expected, rel=1e-15)
 
 
-def test_frequency_of_a_period_is_the_nearest_number():
-    ctx = context(50)
-    law = Fourier(1.0, period=3.0, cos=(0.5,))
-    assert abs(frequency(ctx, law) * 3 - 2 * ctx.pi) < ctx.mpf(10) ** -48
-    assert float(frequency(ctx, Fourier(1.0, 0.1, (0.5,)))) == 0.1
-
-
 @pytest.mark.parametrize(("time", "level"), [(0.0, 1.0), (0.25, 0.3), (0.5, 0.3), (0.75, 1.0), (1.0, 1.0)])
 def test_bang_bang_rests_at_its_knots(time, level):
     ctx = context(40)

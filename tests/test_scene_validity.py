@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 import random
 from fractions import Fraction
 
@@ -112,7 +111,7 @@ def test_contact_is_decided_exactly(make, laws, expected):
     assert is_valid(make, **laws) == expected
 
 
-clocks = st.sampled_from([Clock("fourier", 1.0), Clock("bang-bang", 2.0)])
+clocks = st.sampled_from([Clock("fourier", 1.0), Clock("bang-bang", 2.0), Clock("mixed", 2.0)])
 
 
 @st.composite
@@ -236,7 +235,6 @@ def test_the_message_says_how_laws_come_to_share_a_period(r, h, message):
 
 
 # Conditions in which Fourier and bang-bang laws meet: proved where the two sides keep apart.
-N_SCENES = int(os.environ.get("MUSHROOMS_MIXED", "100"))
 FINE = MPContext()
 FINE.prec = 400  # bits, far more than the proofs work with
 
@@ -279,34 +277,11 @@ def test_conditions_are_enclosed():
             assert over.a < exactly(wave, t) * exactly(legs, t) - 0.5 < over.b
 
 
-def verdict_by_sampling(wave, legs, n: int) -> float:
-    start, period = Fraction(legs.knots[0][0]), Fraction(wave.period)
-    return min(
-        float(exactly(wave, start + period * i / n) - exactly(legs, start + period * i / n)) for i in range(n)
-    )
-
-
 def decide(wave, legs):
     try:
         return Mushroom(r=wave, w=legs, h=1.0)
     except InvalidScene as refusal:
         return str(refusal)
-
-
-@pytest.mark.deep
-def test_the_proof_agrees_with_sampling(tally):
-    """W <= r for w of legs and r of waves: random scenes, about half of them invalid."""
-    draw = random.Random("scenes")
-    for _ in range(N_SCENES):
-        wave, legs = random_laws(draw)
-        found, least = decide(wave, legs), verdict_by_sampling(wave, legs, 256)
-        tally["valid" if isinstance(found, Mushroom) else "refused"] += 1
-        if isinstance(found, Mushroom):
-            assert least > 0
-        else:
-            assert "w <= r fails by" in found
-            assert least < 0.02  # curvature times the square of the distance of samples
-    assert min(tally["valid"], tally["refused"]) > N_SCENES // 6
 
 
 def dip(gap: float):

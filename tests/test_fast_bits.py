@@ -14,7 +14,7 @@ from scene import Cap, State, load
 from scene.transforms import mirrored, mirrored_wall
 
 # Of `small_ensemble`. It changes when the arithmetic does, and then only on purpose.
-PINNED = "20148a59436b17ede759b139061a83977645d4ad60bee275ddef713d22bfe667"
+PINNED = "c1b1a9d9937610a9d4285761981049493d5e39a5532ab7353222f28762f68230"
 
 
 def small_ensemble(threads: int | None = None) -> fast.Ensemble:

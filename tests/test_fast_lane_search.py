@@ -81,24 +81,18 @@ def test_a_start_by_decree_is_left_to_the_careful_step():
 POORER_GUESS = "return fma(r1, r2, r0 * r3 * (1.0 / 3.0))", "return 0.0"
 # What is taken out of aiming.py or lanes.py, and the group of draws and number of answers that miss it.
 MUTANTS = {
-    "the arc's chord on a flight to the base": (
-        "arc to base",
-        800,
-        "return inside if hit == ON_BASE else place",
-        "return 1.0 if hit == ON_BASE else place",
-    ),
     "the mouth's own curvature": (
         "side to arc",
         300,
-        "doubt = fma(excess, per_r, k_side)",
-        "doubt = fma(excess, per_r, 0.0)",
+        "doubt = k * depth * depth",
+        "doubt = 0.0",
     ),
-    "the sides before the mouth": ("side to arc", 300, "min(gap - doubt, lift)", "lift"),
+    "the sides before the mouth": ("side to arc", 300, "else gap - doubt", "else 1.0"),
     "concavity of the arc": (
         ANYWHERE,
         4000,
-        "concave = v2 - bend if hit == ON_ARC else 1.0",
-        "concave = 1.0",
+        "min(v2 - bend, pushed)",
+        "pushed",
         *POORER_GUESS,
     ),
     "walls that are not met": (
@@ -116,7 +110,7 @@ MUTANTS = {
     "the part of the table that a wall is in": (
         "arc to stem",
         500,
-        "place -= fma(abs(vy), fma(SAFETY, s, slack), SAFETY * abs(y))",
+        "place -= fma(abs(outset.vy), slack, blur)",
         "place = 1.0",
     ),
     "what Newton's step leaves": (
@@ -146,19 +140,19 @@ MUTANTS = {
     "what a bounce hangs on": (
         "slow beside a plateau",
         100,
-        "return told if hit >= ON_LEFT else 1.0",
-        "return 1.0",
+        "min(v2 - bend, pushed)",
+        "v2 - bend",
     ),
     "what a hop hangs on": (
         "early hop",
         1500,
-        "known = min(known, told_rate(a[T + i], r, r1, r2, sizes, limits))",
+        "known = min(known, told_rate(r, sizes, limits))",
         "known = known + 0.0",
     ),
     "what a hop through the base hangs on": (
         "early hop through the base",
         1500,
-        "quality = min(quality, told_rate(a[T + i], r, r1, r2, sizes, limits))",
+        "quality = min(quality, told_rate(r, sizes, limits))",
         "quality = min(quality, 1.0)",
     ),
     "how far the series of a hop's turn serve": (
@@ -194,8 +188,8 @@ MUTANTS = {
     "the floor before the mouth": (
         "corner over a rising floor",
         100,
-        "min(gap - doubt, lift)",
-        "gap - doubt",
+        "else k_side + limits.lift",
+        "else k_side",
     ),
     "concavity of the arc under a chord": (
         "misled chord",
@@ -273,7 +267,7 @@ def test_a_hit_near_a_corner_is_on_the_right_side_of_it(draw, tally):
 
 
 NO_SLACK = ("return slack if error < s else 0.0", "return 0.0")
-# Terms of rounding, and a draw of corners that misses each.
+# Terms of rounding and a check, and a draw of corners that misses each.
 ROUNDING = {
     "the mouth's edge": (
         "a resting mouth's edge",
@@ -282,13 +276,18 @@ ROUNDING = {
     ),
     "the height at the end": (
         "the end of a resting arc",
-        "place -= fma(abs(vy), fma(SAFETY, s, slack), SAFETY * abs(y))",
+        "place -= fma(abs(outset.vy), slack, blur)",
         "place -= 0.0",
+    ),
+    "the arc on a flight to the base": (
+        "the end of the arc",
+        "return inside if hit == ON_BASE else place",
+        "return 1.0 if hit == ON_BASE else place",
     ),
     "the base inside the arc": (
         "the end of a resting arc",
-        "inside = fma(-SAFETY, fma(abs(vx), s, limits.size + abs(x)), r - abs(x_s))",
-        "inside = r - abs(x_s)",
+        "inside = (r - abs(end.x)) - blur",
+        "inside = r - abs(end.x)",
     ),
     "walls that are not met": (
         "a resting floor's corner",

@@ -57,7 +57,7 @@ def test_the_compiler_packs_divisions_and_square_roots(loop, form, is_slope_movi
 @pytest.mark.parametrize("step", [fly, chord])
 def test_the_width_of_registers_changes_no_bit(step):
     less = {**step.__globals__, "widest_registers": njit(lambda: None)}
-    limits, waves = LawLimits(*np.ones(9)), NO_WAVES._replace(omega=0.5, r=(1.0, 0.1, 0.2, 0.0, 0.0))
+    limits, waves = LawLimits(*np.ones(8)), NO_WAVES._replace(omega=0.5, r=(1.0, 0.1, 0.2, 0.0, 0.0))
     pools, texts = [], []
     for each in (step, FunctionType(step.__code__, less)):
         pool = np.random.default_rng(1).uniform(0.5, 2.0, POOL_SIZE)

@@ -60,20 +60,17 @@ def side_bend(y, vy, now, slope):
 
 
 @part
-def mouth_crossing(outset, w0, w1, k_side, per_r, limits):
-    """Return `gap`, `doubt` and `lift` of docs/lanes.md: on which side of the mouth's edge y = 0 is crossed.
+def mouth_crossing(outset, w0, w1, k, limits):
+    """Return `gap` and `doubt` of docs/lanes.md: on which side of the mouth's edge y = 0 is crossed.
 
-    The gap comes times |vy|, the other two times |vy|^2.
+    The gap comes times |vy|, the doubt times |vy|^2.
     """
-    (x, y, vx, vy, _, _, v2), bend, rate_w, size = outset, limits.bend, limits.rate, limits.size
+    (x, y, vx, vy, _, _, _), rate_w, size = outset, limits.rate, limits.size
     depth, rise = abs(y), abs(vy)
     gap = fma(w0, rise, w1 * depth) - abs(fma(x, vy, -y * vx))
-    excess = bend - v2
-    excess = excess if excess > 0.0 else 0.0  # by how much the arc's function may be convex, halved
-    doubt = fma(excess, per_r, k_side) * depth * depth
+    doubt = k * depth * depth
     doubt = fma(SAFETY * rise, fma(size + abs(x), rise, (abs(vx) + rate_w) * depth), doubt)
-    lift = fma(-limits.curvature * depth, depth, limits.least_h * rise * rise)
-    return gap, doubt, lift
+    return gap, doubt
 
 
 @part
@@ -129,12 +126,14 @@ def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
 
     SURE is positive only where the part of the flight before y = 0 is as chosen: docs/lanes.md.
     """
-    bend, per_r = limits.bend, 2.0 / limits.least_r
     outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, degree)
-    x, y, vx, vy, wall, _, v2 = outset
+    x, y, vx, vy, wall, _, _ = outset
     depth, rise = abs(y), abs(vy)
+    is_in_cap = 1.0 if wall < 1.5 else 0.0
+    is_in_cap = 0.0 if is_stem else is_in_cap
     k_side = side_curvature(vy, slope, limits)
-    gap, doubt, lift = mouth_crossing(outset, now.w, now.w1, k_side, per_r, limits)
+    k = k_side if is_in_cap > 0.5 else k_side + limits.lift
+    gap, doubt = mouth_crossing(outset, now.w, now.w1, k, limits)
     edge, drift = fma(now.m, y, now.w), fma(now.m, vy, side_rate(y, now, slope))
     f, d, side = nearest_below(wall, edge - x, vx - drift, edge + x, -vx - drift, y + now.h, -vy - now.h1)
     f_a, d_a, root = arc_quotient(outset, now.r, now.r1, now.r2)
@@ -145,8 +144,6 @@ def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
     below = side if gap > 0.0 else ON_BASE
     from_cap = ON_ARC if reaches > 0.0 else below
     from_stem = side if stays > 0.0 else top
-    is_in_cap = 1.0 if wall < 1.5 else 0.0
-    is_in_cap = 0.0 if is_stem else is_in_cap
     hit = from_cap if is_in_cap > 0.5 else from_stem
     f = f_a if hit == ON_ARC else f
     d = d_a if hit == ON_ARC else d
@@ -164,11 +161,9 @@ def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
     # Comparisons so put that what is no number is never sure.
     whole = reaches if is_in_cap > 0.5 else stays
     gap = gap * rise
-    sure = abs(gap) - doubt if is_in_cap > 0.5 else min(gap - doubt, lift)
+    sure = abs(gap) - doubt if is_in_cap > 0.5 else gap - doubt
     sure = 1.0 if is_stem else sure
     sure = 1.0 if whole > 0.0 else sure
-    # The arc's function must be concave.
-    concave = v2 - bend if hit == ON_ARC else 1.0
     s = a[S + i] if a[TRIES + i] > 0.0 else s
-    a[HIT + i], a[S + i], a[SURE + i] = hit, s, min(concave, sure)
+    a[HIT + i], a[S + i], a[SURE + i] = hit, s, sure
     return s

@@ -7,21 +7,24 @@ import numpy as np
 from fast.kernel.arithmetic import dot, fma, short_sum
 from fast.kernel.compiling import packed
 from fast.kernel.pools import (
+    CAPTURED,
+    CLEARLY,
     N_ARC,
     N_BASE,
     N_FLOOR,
     N_LEFT,
     N_RIGHT,
-    NEVER,
+    NOT_YET,
     ON_ARC,
     ON_BASE,
     ON_FLOOR,
     ON_LEFT,
     ON_RIGHT,
+    OVER,
 )
 
 ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
-CLEARLY_CAPTURED = 1.05  # |L| over w v from which a particle moves to the disk's pool
+CLEARLY_BEYOND = 1.05 * 1.05  # (L / (w v))^2 from which a particle moves to the disk's pool
 
 
 @packed
@@ -95,45 +98,18 @@ def off_the_wall(hit, place, vx, vy, at_hit, slope):
 
 
 @packed
-def captured(hit, is_mushroom, x, y, vx, vy, w):
-    """Return what is positive where |sin phi| > nu just before a hit of the arc (eq. sinphi), else 0."""
-    spin = fma(x, vy, -y * vx)
-    beyond = fma(spin, spin, -w * w * fma(vx, vx, vy * vy))
-    beyond = beyond if hit == ON_ARC else 0.0
-    return beyond if is_mushroom else 0.0
+def stay_after(stay, hit, place, v, w):
+    """Return whether a particle is captured after a hit, from whether it was, and v before the bounce.
 
-
-@packed
-def spin_in_disk(beyond, x, y, vx, vy, w):
-    """Return the angular momentum after a bounce of a particle that is clearly captured, 0 for others."""
-    spin = dot(x, vy, -y, vx)
-    clearly = CLEARLY_CAPTURED * CLEARLY_CAPTURED * w * w * fma(vx, vx, vy * vy)
-    spin = spin if spin * spin > clearly else 0.0
-    return spin if beyond > 0.0 else 0.0
-
-
-@packed
-def stay_after(hit, t, beyond, since, until, begin, end):
-    """Return begin and end of a capture interval after a hit, and its end where it is over and to be kept.
-
-    A stay in the cap counts as captured from its first arc hit with |sin phi| > nu to the hit at which that
-    ended. It is kept where it spans an instant between `since` and `until`.
+    It is at a hit of the arc with |sin phi| > nu (eq. sinphi), |L| > w v, and until the next of the arc.
     """
-    # At the arc: the stay begins, goes on, or (once, until captured again) ends.
-    first_end = min(end, t) if begin < NEVER else end
-    end = first_end if hit == ON_ARC else end
-    end = NEVER if beyond > 0.0 else end
-    begin = min(begin, t) if beyond > 0.0 else begin
-    # Below the mouth: it is over.
-    last = min(end, t)
-    kept = last if begin <= until else NEVER
-    kept = kept if since <= last else NEVER
-    kept = kept if begin < NEVER else NEVER
-    kept = kept if hit >= ON_LEFT else NEVER
-    left = NEVER if kept == NEVER else begin
-    begin = left if hit >= ON_LEFT else begin
-    end = NEVER if hit >= ON_LEFT else end
-    return begin, end, kept
+    vx, vy, v2 = v
+    spin, edge = fma(place.x, vy, -place.y * vx), w * w * v2
+    at_arc = min(stay, OVER)
+    at_arc = CAPTURED if spin * spin > edge else at_arc
+    at_arc = CLEARLY if spin * spin > CLEARLY_BEYOND * edge else at_arc
+    after = at_arc if hit == ON_ARC else stay
+    return NOT_YET if hit >= ON_LEFT else after
 
 
 @packed

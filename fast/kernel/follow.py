@@ -21,15 +21,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from fast.kernel.arithmetic import fma
-from fast.kernel.bounces import captured, count_hit, spin_in_disk, stay_after
+from fast.kernel.arithmetic import dot, fma
+from fast.kernel.bounces import count_hit, stay_after
 from fast.kernel.compiling import HOW, kept, kernel, part
 from fast.kernel.lane_laws import know_laws, set_piece, set_reference
 
 from fast.kernel.pools import (  # isort: skip
-    AS_GIVEN, END, FAR, FATE, LANES, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, N_ROWS,
-    ON_ARC, PIECE, R1, REF, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, TRIES, T_LOW, UNTIL, VX, VY,
-    W0_LOW, WALL, WHEN, X, Y, change_lane, load, particle_of, put_particle, refold, whole_registers,
+    AS_GIVEN, CAPTURED, CLEARLY, END, FAR, FATE, LANES, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER,
+    NOT_YET, N_ARC, N_BASE, N_ROWS, ON_ARC, OVER, PIECE, R1, REF, S, SINCE, SPIN, STAY, STAY_IN, STAY_OUT,
+    STOP, STRIDE, T, TRIES, T_LOW, UNTIL, VX, VY, W0_LOW, WALL, WHEN, X, Y, change_lane, load, particle_of,
+    put_particle, refold, whole_registers,
 )  # fmt: skip
 from fast.kernel.records import (  # isort: skip
     ANEW, ARC, HORIZON, N_WALLS, RADIUS, TOO_FAR, VALUE, WIDTH, Particle, particle_at, write_state,
@@ -67,7 +68,10 @@ def take_lane(a, i, roster, j, worker):
     worker.followed.careful[j] = int(kept[CAREFUL])
     for k in range(W0_LOW // STRIDE):
         a[k * STRIDE + i] = kept[FIRST_ROW + k]
-    a[WHEN + i], a[STOP + i], a[END + i] = NEVER, -NEVER, -NEVER
+    a[STAY + i] = CAPTURED if a[STAY_OUT + i] == NEVER else OVER
+    if a[STAY_IN + i] == NEVER:
+        a[STAY + i] = NOT_YET
+    a[STOP + i], a[END + i] = -NEVER, -NEVER
     if kept[IS_KNOWN] > 0.0 and worker.degree % 2 == 0:
         set_piece(a, i, int(a[PIECE + i]), worker.scene, worker.pieces, worker.degree)
     elif kept[IS_KNOWN] > 0.0:
@@ -111,14 +115,22 @@ def note_stops(a, i, roster, last, stops, followed):
 
 @part
 def note_stay(a, i, roster, stops, followed):
-    """Record a capture interval that is over."""
-    at = roster[NEXT_STOP, i]
-    while stops.cycles[at] < 0:  # the last stop ends a cycle
-        at += 1
-    keep_stay(roster[PARTICLE, i], stops.cycles[at], a[STAY_IN + i], a[WHEN + i], stops, followed)
-    a[STAY_IN + i] = a[STAY_OUT + i] = a[WHEN + i] = NEVER
-    if stops.is_first_kept:
-        a[UNTIL + i] = -NEVER  # no other is wanted
+    """Bring a lane's capture interval up to date with its last hit, and record it where it is over."""
+    stay, t, begin = a[STAY + i], a[T + i], a[STAY_IN + i]
+    end = min(a[STAY_OUT + i], t)
+    if stay >= CAPTURED:
+        a[STAY + i], a[STAY_IN + i], a[STAY_OUT + i] = CAPTURED, min(begin, t), NEVER
+    elif stay == OVER:
+        a[STAY_OUT + i] = end
+    elif begin < NEVER:
+        if begin <= a[UNTIL + i] and a[SINCE + i] <= end:
+            at = roster[NEXT_STOP, i]
+            while stops.cycles[at] < 0:  # the last stop ends a cycle
+                at += 1
+            keep_stay(roster[PARTICLE, i], stops.cycles[at], begin, end, stops, followed)
+            if stops.is_first_kept:
+                a[UNTIL + i] = -NEVER  # no other is wanted
+        a[STAY_IN + i] = a[STAY_OUT + i] = NEVER
 
 
 @part
@@ -175,13 +187,11 @@ def land_carefully(pool, a, i, code, s, p, worker):
     scene, hit = worker.scene, float(code)
     if code != ARC or a[WALL + i] != ON_ARC:  # it has left the arc by now
         a[AS_GIVEN + i] = 0.0
-    w = worker.anchors[WIDTH, VALUE]
-    if scene.is_relative:
-        w *= worker.anchors[RADIUS, VALUE]
-    beyond = captured(hit, worker.table.is_mushroom, p.x, p.y, a[VX + i], a[VY + i], w)
-    stay = a[SINCE + i], a[UNTIL + i], a[STAY_IN + i], a[STAY_OUT + i]
-    a[STAY_IN + i], a[STAY_OUT + i], a[WHEN + i] = stay_after(hit, p.t, beyond, *stay)
-    a[SPIN + i] = spin_in_disk(beyond, p.x, p.y, p.vx, p.vy, w)
+    if worker.table.is_mushroom:
+        w, vx, vy = worker.anchors[WIDTH, VALUE], a[VX + i], a[VY + i]
+        if scene.is_relative:
+            w *= worker.anchors[RADIUS, VALUE]
+        a[STAY + i] = stay_after(a[STAY + i], hit, p, (vx, vy, fma(vx, vx, vy * vy)), w)
     if pool == DISK:
         a[SPIN + i] = p.x * p.vy - p.y * p.vx
     count_hit(a, i, hit)
@@ -235,15 +245,18 @@ def mark(pool, a, i, since, roster, worker):
 
     Its flight was looked at up to the time `since`.
     """
-    if a[WHEN + i] < NEVER:
-        note_stay(a, i, roster, worker.stops, worker.followed)
+    is_clearly_captured = a[STAY + i] == CLEARLY
+    note_stay(a, i, roster, worker.stops, worker.followed)
     if a[T + i] >= a[END + i] and a[END + i] > -NEVER:
         set_reference(a, i, a[T + i], a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
     if knows_laws(a, i, worker):
         set_stop(a, i, since, roster, worker)
     else:
         a[STOP + i] = -NEVER
-    return MOVES if pool == GENERAL and a[SPIN + i] != 0.0 and worker.is_laned else STAYS
+    if pool == GENERAL and is_clearly_captured and worker.is_laned:
+        a[SPIN + i] = dot(a[X + i], a[VY + i], -a[Y + i], a[VX + i])
+        return MOVES
+    return STAYS
 
 
 @kernel
@@ -262,7 +275,6 @@ def code_of_attention(pool, a, i, roster, worker):
             code = HORIZON
         if not a[WHEN + i] < worker.pieces.until:
             a[END + i] = -NEVER
-        a[WHEN + i] = NEVER
     else:
         code = step_carefully(pool, a, i, roster, worker)
         code = ARC if code < HORIZON else code

@@ -22,11 +22,9 @@ from fast.kernel.aiming import aim, cube_of_arc, outset_of, side_curvature, side
 from fast.kernel.arithmetic import SAFETY, fma, short_sum, two_product, two_sum
 from fast.kernel.bounces import (
     ONE,
-    captured,
     count_hit,
     off_the_arc_spinning,
     off_the_wall,
-    spin_in_disk,
     stay_after,
 )
 from fast.kernel.compiling import packed, part, widest_registers
@@ -41,8 +39,8 @@ from fast.kernel.lane_laws import (
 
 from fast.kernel.pools import (  # isort: skip
     AHEAD, COARSE, END, FAR, FATE, HIT, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, ON_ARC,
-    ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, REFUSED, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, SURE, T,
-    TRIES, T_LOW, UNTIL, VX, VY, WALL, WHEN, X, Y,
+    ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, REFUSED, S, SPIN, STAY, STOP, SURE, T, TRIES, T_LOW, VX, VY,
+    WALL, WHEN, X, Y,
 )  # fmt: skip
 from fast.kernel.records import Place
 
@@ -61,14 +59,6 @@ def place_after(s, x, y, vx, vy):
     x_s, x_low = moved(x, vx, s)
     y_s, y_low = moved(y, vy, s)
     return Place(x_s, x_low, y_s, y_low)
-
-
-class Correction(NamedTuple):
-    """Newton's correction of a time, with 1 / f', and the error that it leaves, times 2^57 at least."""
-
-    delta: float
-    inverse: float
-    error: float
 
 
 class Judged(NamedTuple):
@@ -116,32 +106,14 @@ def left_in_place(error, hit, vx, vy, r):
 
 
 @part
-def told_rate(t, r, r1, r2, sizes, limits):
+def told_rate(r, sizes, limits):
     """Return `told` of docs/lanes.md: positive where a hop hangs on r' no more than on what enters."""
-    return fma(r, fma(abs(t), abs(r2), abs(r1)) - (limits.arc_rate + limits.rate), sizes)
+    return fma(-r, limits.rate + limits.arc_rate, sizes)
 
 
 @part
-def told_push(hit, t, outset, y_s, stem, slope, limits):
-    """Return `pushed` of docs/lanes.md: positive where a bounce hangs on a rate no more than on what enters.
-
-    Of sides and floor; the arc is met by nobody slower than it.
-    """
-    _, _, vx, vy, _, _, _ = outset
-    rate = stem.h1 if hit == ON_FLOOR else side_rate(y_s, stem, slope)
-    bend = stem.h2 if hit == ON_FLOOR else (fma(stem.m2, y_s, stem.w2) if slope is None else stem.w2)
-    told = (abs(vx) + abs(vy)) + fma(abs(t), abs(bend), abs(rate)) - limits.rate
-    told = 1.0 if abs(rate) + abs(bend) == 0.0 else told
-    return told if hit >= ON_LEFT else 1.0
-
-
-@part
-def slack_of(hit, wall, s, correction, r, sizes, blur):
-    """Return `slack` of docs/lanes.md: how far off s a certain hit may be."""
-    delta, inverse, error = correction
-    f_error = 2.0 * SAFETY * s * sizes if wall == ON_ARC else 2.0 * r * blur
-    f_error = f_error if hit == ON_ARC else blur
-    f_error = 0.0 if hit == ON_BASE else f_error
+def slack_of(s, f_error, delta, inverse, error):
+    """Return `slack` of docs/lanes.md: how far off s a certain hit may be, f being known to `f_error`."""
     slack = fma(f_error, abs(inverse), abs(delta))
     return slack if error < s else 0.0
 
@@ -165,18 +137,14 @@ def clearance(hit, place, stem, far):
 
 
 @part
-def place_on_wall(hit, s, outset, end, r, is_stem, slack, limits):
+def place_on_wall(hit, outset, end, r, is_stem, slack, blur):
     """Return `place` of docs/lanes.md: positive where the wall met is met in its own part of the table.
 
     The arc is met above y = 0, sides and floor below it, the base inside the arc.
     """
-    (x, y, vx, vy, _, _, v2), (x_s, _, y_s, _) = outset, end
-    place = y_s if hit == ON_ARC else -y_s
-    place -= fma(abs(vy), fma(SAFETY, s, slack), SAFETY * abs(y))
-    excess = limits.bend - v2
-    excess = excess if excess > 0.0 else 0.0
-    inside = fma(-SAFETY, fma(abs(vx), s, limits.size + abs(x)), r - abs(x_s))
-    inside = fma(inside, limits.least_r, -2.0 * excess * s * s)
+    place = end.y if hit == ON_ARC else -end.y
+    place -= fma(abs(outset.vy), slack, blur)
+    inside = (r - abs(end.x)) - blur
     inside = 1.0 if is_stem else inside
     return inside if hit == ON_BASE else place
 
@@ -219,7 +187,7 @@ def land(a, i, table, waves, slope, degree, limits):
     x, y, vx, vy, wall, q, v2 = outset
     there = laws_in(a, AHEAD + i, waves, is_relative, slope, degree)
     r0, dr, known = radius_since(a, i, s, waves, degree)
-    r, r1, r2 = there.r, there.r1, there.r2
+    r, r1 = there.r, there.r1
     k_side = side_curvature(vy, slope, limits)
     end = place_after(s, x, y, vx, vy)
     x_s, x_low, y_s, y_low = end
@@ -230,26 +198,28 @@ def land(a, i, table, waves, slope, degree, limits):
     f_arc = hop if wall == ON_ARC else f_arc
     f = f_arc if hit == ON_ARC else f
     rate = 2.0 * fma(r, r1, -fma(s, v2, q)) if hit == ON_ARC else rate
-    bend_s = 2.0 * (bend + v2) if hit == ON_ARC else k_side
+    half_bend = bend + v2 if hit == ON_ARC else 0.5 * k_side
     f = y_s + y_low if hit == ON_BASE else f
     rate = vy if hit == ON_BASE else rate
-    bend_s = 0.0 if hit == ON_BASE else bend_s
+    half_bend = 0.0 if hit == ON_BASE else half_bend
     inverse = ONE / rate
     delta = -f * inverse
-    error = error_left(0.5 * bend_s * inverse, s, delta, waves)
+    error = error_left(half_bend * inverse, s, delta, waves)
     error = left_in_place(error, hit, vx, vy, r)
     sizes = arc_sizes(s, outset, r, limits)
     blur = SAFETY * fma(abs(vx) + abs(vy), s, limits.size + abs(x) + abs(y))
-    slack = slack_of(hit, wall, s, Correction(delta, inverse, error), r, sizes, blur)
+    slack = slack_of(s, blur * (16.0 * r) if hit == ON_ARC else blur, delta, inverse, error)
     # The others are not reached: see the error analysis. The mouth was looked at.
     clear = clearance(hit, end, there, far_enough(s, outset, k_side, slack, blur, limits))
     quality = min(a[SURE + i], clear if hit >= (ON_ARC if is_stem else ON_LEFT) else 1.0)
-    place = place_on_wall(hit, s, outset, end, r, is_stem, slack, limits)
+    place = place_on_wall(hit, outset, end, r, is_stem, slack, blur)
     first = way_out(hit, s, outset, rate, k_side, sizes, limits)
     quality = min(min(quality, place), min(first, s))
-    quality = min(quality, told_push(hit, a[T + i], outset, y_s, there, slope, limits))
+    # The arc's function must be concave, and a bounce hang on a rate no more than on what enters.
+    pushed = (abs(vx) + abs(vy)) - limits.rate if hit >= ON_LEFT else 1.0
+    quality = min(quality, min(v2 - bend, pushed))
     # A hop needs the radius at both of its ends, and its rate as well as what enters.
-    known = min(known, told_rate(a[T + i], r, r1, r2, sizes, limits))
+    known = min(known, told_rate(r, sizes, limits))
     known = known if hit == ON_ARC else 1.0
     quality = min(quality, known if wall == ON_ARC else 1.0)
     within, ahead = room_ahead(a, i, s, delta, waves)
@@ -263,21 +233,15 @@ def land(a, i, table, waves, slope, degree, limits):
 @packed
 def settle(a, i, flight, outset, end, there, is_mushroom, slope):
     """Bounce off the wall that was met; returns whether the particle moves on, and the laws at the hit."""
-    hit, vx, vy = a[HIT + i], outset.vx, outset.vy
+    hit, vx, vy, v2 = a[HIT + i], outset.vx, outset.vy, outset.v2
     t, t_low, at, at_hit, is_moved = arrive(a, i, flight, outset, end, there)
     at = Place(at.x, at.x_low, 0.0 if hit == ON_BASE else at.y, at.y_low)
     vx_s, vy_s = off_the_wall(hit, at, vx, vy, at_hit, slope)
-    beyond = captured(hit, is_mushroom, at.x, at.y, vx, vy, at_hit.w)
-    spin = spin_in_disk(beyond, at.x, at.y, vx_s, vy_s, at_hit.w)
-    begin, over, kept = stay_after(
-        hit, t, beyond, a[SINCE + i], a[UNTIL + i], a[STAY_IN + i], a[STAY_OUT + i]
-    )
-    is_quiet = kept == NEVER if spin == 0.0 else False
+    stay = stay_after(a[STAY + i], hit, at, (vx, vy, v2), at_hit.w) if is_mushroom else a[STAY + i]
+    is_quiet = stay == a[STAY + i]
     if is_moved:
         count_hit(a, i, hit)
-        a[STAY_IN + i], a[STAY_OUT + i], a[WALL + i] = begin, over, hit
-    a[SPIN + i] = spin if is_moved else 0.0
-    a[WHEN + i] = kept if is_moved else t
+        a[STAY + i], a[WALL + i] = stay, hit
     move(a, i, flight, is_moved, is_quiet, (t, t_low, at.x, at.y, vx_s, vy_s))
     return is_moved, at_hit
 
@@ -301,6 +265,7 @@ def move(a, i, flight, is_moved, is_quiet, state):
     fate = MOVED if t < a[END + i] else MARKED
     fate = fate if is_quiet else MARKED
     a[FATE + i] = fate if is_moved else result
+    a[WHEN + i] = t
     a[S + i] = s + delta if within > 0.0 else s  # from laws out of their reach nothing is learnt
     tries = a[TRIES + i] + 1.0
     a[TRIES + i] = tries if result == COARSE else (tries if result == FAR else 0.0)
@@ -353,7 +318,7 @@ def chord(a, n, table, waves, slope, degree, limits):
         x, y, vx, vy, _, q, v2 = outset
         s = a[S + i]
         there = laws_in(a, AHEAD + i, waves, is_relative, slope, degree)
-        r, r1, r2, w = there.r, there.r1, there.r2, there.w
+        r, r1, w = there.r, there.r1, there.w
         r0, dr, known = radius_since(a, i, s, waves, degree)
         f = hop_along_arc(s, outset, r0, dr)
         rate = 2.0 * fma(r, r1, -fma(s, v2, q))
@@ -367,11 +332,11 @@ def chord(a, n, table, waves, slope, degree, limits):
         clear = 1.0 if is_cap else clear
         sizes = arc_sizes(s, outset, r, limits)
         first = -rate - 2.0 * SAFETY * sizes
-        slack = slack_of(ON_ARC, ON_ARC, s, Correction(delta, inverse, error), r, sizes, 0.0)
+        slack = slack_of(s, 2.0 * SAFETY * s * sizes, delta, inverse, error)
         place = abs(end.y) - fma(abs(vy), fma(SAFETY, s, slack), SAFETY * abs(y))
         quality = min(min(clear, place), min(first, v2 - bend))
         quality = min(min(quality, s), known)
-        quality = min(quality, told_rate(a[T + i], r, r1, r2, sizes, limits))
+        quality = min(quality, told_rate(r, sizes, limits))
         within, ahead = room_ahead(a, i, s, delta, waves)
         result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
         flight = Judged(s, delta, within, result)
@@ -383,7 +348,6 @@ def chord(a, n, table, waves, slope, degree, limits):
         if is_moved:
             a[N_ARC + i] += 1.0
             a[N_BASE + i] += crossed
-        a[WHEN + i] = NEVER if is_moved else t
         move(a, i, flight, is_moved, True, (t, t_low, at.x, at.y, vx_s, vy_s))
         if is_moved:
             move_laws(a, i, delta, at_hit, waves, slope)

@@ -43,9 +43,8 @@ def side_ahead(outset, now, slope):
 @packed
 def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
     """Choose the wall and guess the time, as `aim` does; returns the wall."""
-    per_r = 2.0 / limits.least_r
     outset, now = outset_of(a, FIRST), laws_in(a, R0 + FIRST, waves, is_relative, slope, degree)
-    _, y, _, vy, wall, _, v2 = outset
+    _, y, _, vy, wall, _, _ = outset
     depth, rise = abs(y), abs(vy)
     k_side = side_curvature(vy, slope, limits)
     sure, root = 1.0, 1.0
@@ -53,7 +52,7 @@ def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
         f, d, root = arc_quotient(outset, now.r, now.r1, now.r2)
         hit = ON_ARC
         if vy < 0.0 and not fma(y, d, vy * f) > 0.0:
-            gap, doubt, _ = mouth_crossing(outset, now.w, now.w1, k_side, per_r, limits)
+            gap, doubt = mouth_crossing(outset, now.w, now.w1, k_side, limits)
             sure, root = abs(gap * rise) - doubt, 1.0
             f, d, hit = side_ahead(outset, now, slope) if gap > 0.0 else (depth, rise, ON_BASE)
     else:
@@ -62,14 +61,13 @@ def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
         if is_crossing and is_stem:
             f, d, hit = depth, rise, ON_BASE
         elif is_crossing:
-            gap, doubt, lift = mouth_crossing(outset, now.w, now.w1, k_side, per_r, limits)
+            gap, doubt = mouth_crossing(outset, now.w, now.w1, k_side + limits.lift, limits)
             f, d, root = arc_quotient(outset, now.r, now.r1, now.r2)
-            sure, hit = min(gap * rise - doubt, lift), ON_ARC
+            sure, hit = gap * rise - doubt, ON_ARC
     inverse = ONE / (d * root)
     s, beyond = f * (root * inverse), 0.0
     if hit == ON_ARC:
         beyond = cube_of_arc(now.r, now.r1, now.r2, now.r3) * s * s * d
-        sure = min(v2 - limits.bend, sure)
     elif hit == ON_FLOOR:
         beyond = now.h2 * s
     elif hit != ON_BASE:

@@ -27,19 +27,23 @@ NEVER = np.inf
     END,  # until when the laws are known; minus infinity where they are not
     LIMIT, BACK,  # how long after the reference time a piece holds, and before it for a hop along the arc
     HIT, SURE, S, TRIES,  # the flight: wall, mouth, time; how often the time has been corrected
-    FATE, WHEN,  # what became of it; for LATE its time, for MARKED the end of a capture interval that is over
+    FATE, WHEN,  # what became of it, and its time
+    STAY,  # of a free particle: whether it is captured
     # The laws where the flight is guessed to end, in as many rows as those at T; with pieces the flight's
     # begin since REF too, and the radius's mean rate.
     AHEAD, _, _, _, _, _, _, _, _, _, _, _, _, _,
     BEFORE, MEAN_RATE,
     LAWS,  # from here on the coefficients of a piece: see Pieces.coefficients
-) = STRIDE * np.arange(62)  # fmt: skip
+) = STRIDE * np.arange(63)  # fmt: skip
 PHASE_SINE, PHASE_COSINE = R0, R1
 N_COEFFICIENTS = 16  # of each law, as many as the highest degree asks for
-N_ROWS = 61 + 4 * N_COEFFICIENTS
+N_ROWS = 62 + 4 * N_COEFFICIENTS
 RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * np.arange(4)
 # Codes of walls as they stand in a row.
 ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
+# Whether a particle is captured in its stay in the cap: not yet, no longer, or yes; and the last, clearly so,
+# just now. A stay counts as captured from its first hit of the arc with |sin phi| > nu to that which ends it.
+NOT_YET, OVER, CAPTURED, CLEARLY = 0.0, 1.0, 2.0, 3.0
 # What became of a flight. The particle is where it was: the end is out of the laws' reach; not shown right;
 # right, and at STOP or later. Or it has moved on, and `attend` is to look at it. Or nothing is to be done, as
 # it has moved on, or as its time is to be corrected once more.
@@ -69,7 +73,7 @@ def load(a, i, particle, is_first_kept):
     # Any stay serves, or none until the mouth has narrowed.
     any_serves = -NEVER if is_first_kept else NEVER
     a[SINCE + i], a[UNTIL + i] = any_serves, -any_serves
-    a[STAY_IN + i] = a[STAY_OUT + i] = a[WHEN + i] = NEVER
+    a[STAY_IN + i] = a[STAY_OUT + i] = NEVER
     a[STOP + i] = a[END + i] = -NEVER
 
 

@@ -30,7 +30,7 @@ from fast.kernel.records import (  # isort: skip
 )  # fmt: skip
 from fast.kernel.scalar_step import scalar_step
 
-LEAST_RADIUS = 2.0**-1000
+LEAST_DEPTH = 2.0**-500  # where a bound says no more than that the depth is positive
 
 
 class LawLimits(NamedTuple):
@@ -44,8 +44,7 @@ class LawLimits(NamedTuple):
         arc_rate: at least |r'|.
         size: at least r + w + (1 + |m|) h, which bounds the terms that a wall's function is summed of.
         lean: at least 1 + |m|.
-        least_r, least_h: at most the least radius and depth. Where a bound says no more than that the
-            radius is positive it is LEAST_RADIUS, with which only concave arcs pass.
+        lift: at least |h''| w / h: a rise short enough beside w / lift is short enough for the floor.
     """
 
     bend: float
@@ -55,8 +54,7 @@ class LawLimits(NamedTuple):
     arc_rate: float
     size: float
     lean: float
-    least_r: float
-    least_h: float
+    lift: float
 
 
 def limits_of(scene: Compiled) -> LawLimits:
@@ -72,15 +70,14 @@ def limits_of(scene: Compiled) -> LawLimits:
         grow * r[FASTEST],
         grow * (r[HIGHEST] + w[HIGHEST] + lean * h[HIGHEST]),
         grow * lean,
-        max(r[LOWEST], LEAST_RADIUS),
-        max(h[LOWEST], 0.0),
+        grow * h[BEND] * w[HIGHEST] / max(h[LOWEST], LEAST_DEPTH),
     )
     return LawLimits(*map(float, found))
 
 
 # What the loops and the scalar step take and return, by samples.
 _PARTICLE, _TABLE = Particle(*(0.0,) * 6, 0), np.zeros((1, 1))
-_LOOP_TAKES = (np.zeros(1), 0, TableOfLanes(*(False,) * 4), NO_WAVES, 0.0, LawLimits(*(0.0,) * 9))
+_LOOP_TAKES = (np.zeros(1), 0, TableOfLanes(*(False,) * 4), NO_WAVES, 0.0, LawLimits(*(0.0,) * 8))
 STEP = returns(types.none, *map(typeof, _LOOP_TAKES))
 _STEP_TAKES = (_PARTICLE, 0.0, 0, Compiled(0, False, _TABLE, _TABLE), _TABLE)
 CAREFUL = returns(typeof((0, 0.0, _PARTICLE)), *map(typeof, _STEP_TAKES))

@@ -154,7 +154,7 @@ def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]
         is_good = (x < w(0.0)) & (v > rate(0.0)) & (rate(u_1) < v) & (u_2 < REACH)
     scene = Mushroom(r=r, nu=nu, h=1.0)
     starts = [
-        (np.array([t[i], 0.0, x[i], -1.0, v[i], 0.5]), int(records.FLOOR))
+        (np.array([t[i], 0.0, x[i], -1.0, v[i], 3.0]), int(records.FLOOR))
         for i in np.flatnonzero(is_good)[:n]
     ]
     return scene, starts

@@ -106,26 +106,10 @@ def _first_flaw(
     t, x, y, vx, vy = after
     table = table_at(fp, scene, t)
     size = table.size + 0.0 * t
-    speed = np.hypot(vx0, vy0)
-    moving = (
-        np.abs(table.r_rate) + np.abs(table.w_rate) + np.abs(table.h_rate) + np.abs(table.slope_rate) * size
-    )
+    speed, moving = np.hypot(vx0, vy0), _speed_of_walls(table, size)
     late = LATE * np.maximum(np.abs(t0), np.abs(t))
     off_flight = np.hypot(x - x0 - vx0 * dt, y - y0 - vy0 * dt) / (size + speed * dt)
-    f, steep, turn, away = 0.0 * t, 1.0 + 0.0 * t, 0.0 * t, 0.0 * t
-    for wall in scene.walls:
-        k = np.flatnonzero(walls == wall)
-        if not k.size:
-            continue
-        at = table_at(fp, scene, t[k])
-        f[k] = at.gap(wall, x[k], y[k])
-        steep[k] = at.r if wall == "arc" else 1.0
-        gx, gy = _gradient(scene, wall, at, x[k], y[k])
-        rate, square = at.gap_rate(wall, x[k], y[k], vx0[k], vy0[k]), gx * gx + gy * gy
-        kick = -2 * rate / square
-        turn[k] = np.hypot(vx[k] - vx0[k] - kick * gx, vy[k] - vy0[k] - kick * gy)
-        turn[k] /= speed[k] + np.abs(kick) * np.sqrt(square) + moving[k]
-        away[k] = rate / np.sqrt(square) / (speed[k] + moving[k])
+    f, steep, turn, away = _meet_walls(scene, before, after, walls, moving)
     # What a start is off its wall is taken out of f, so that the next hit of the same wall keeps it.
     now = table_at(fp, scene, start.t)
     first = 0.0 if start.wall is None else float(now.gap(start.wall, start.x, start.y))
@@ -160,6 +144,35 @@ def _first_flaw(
         return _not_kept(scene, start, after)
     why = min(bad, key=lambda name: bad[name])
     return f"outcome {bad[why] + 1} {why}"
+
+
+def _speed_of_walls(table: Any, size: Any) -> Any:
+    """Return a bound on how fast any place of a wall moves."""
+    return (
+        np.abs(table.r_rate) + np.abs(table.w_rate) + np.abs(table.h_rate) + np.abs(table.slope_rate) * size
+    )
+
+
+def _meet_walls(scene: Scene, before: Any, after: Any, walls: Any, moving: Any) -> tuple[Any, Any, Any, Any]:
+    """Return f of each hit's wall, its scale, how far the bounce is off, and how fast f grows on arrival."""
+    _, _, _, vx0, vy0 = before
+    t, x, y, vx, vy = after
+    speed = np.hypot(vx0, vy0)
+    f, steep, turn, away = 0.0 * t, 1.0 + 0.0 * t, 0.0 * t, 0.0 * t
+    for wall in scene.walls:
+        k = np.flatnonzero(walls == wall)
+        if not k.size:
+            continue
+        at = table_at(fp, scene, t[k])
+        f[k] = at.gap(wall, x[k], y[k])
+        steep[k] = at.r if wall == "arc" else 1.0
+        gx, gy = _gradient(scene, wall, at, x[k], y[k])
+        rate, square = at.gap_rate(wall, x[k], y[k], vx0[k], vy0[k]), gx * gx + gy * gy
+        kick = -2 * rate / square
+        turn[k] = np.hypot(vx[k] - vx0[k] - kick * gx, vy[k] - vy0[k] - kick * gy)
+        turn[k] /= speed[k] + np.abs(kick) * np.sqrt(square) + moving[k]
+        away[k] = rate / np.sqrt(square) / (speed[k] + moving[k])
+    return f, steep, turn, away
 
 
 def _gradient(scene: Scene, wall: str, table: Any, x: Any, y: Any) -> tuple[Any, Any]:

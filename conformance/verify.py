@@ -38,7 +38,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache, partial, reduce
-from math import ceil, floor, inf
+from math import floor, inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -159,7 +159,8 @@ class Interval:
     @property
     def ends(self) -> tuple[Fraction, Fraction]:
         """Return both ends."""
-        return self.lo * Fraction(2) ** self.exp, self.hi * Fraction(2) ** self.exp
+        up, down = 1 << max(self.exp, 0), 1 << max(-self.exp, 0)
+        return Fraction(self.lo * up, down), Fraction(self.hi * up, down)
 
     def cut(self) -> Interval:
         """Return a point inside, near the middle: not the middle, where a root may well lie.
@@ -183,6 +184,11 @@ def rounded(lo: int, hi: int, exp: int, bits: int) -> Interval:
     """Return an interval rounded outward to so many digits."""
     extra = max(0, max(lo.bit_length(), hi.bit_length()) - bits)
     return Interval(lo >> extra, -(-hi >> extra), exp + extra, bits)
+
+
+def floor_of(end: int, exp: int) -> int:
+    """Return the greatest integer that is at most end 2^exp."""
+    return end << exp if exp > 0 else end >> -exp
 
 
 def number(value: Fraction | int, bits: int) -> Interval:
@@ -236,11 +242,11 @@ def cos_sin(turns: Interval) -> tuple[Interval, Interval]:
     than 4, from e = 0 on. The series alternates, so what is left out counts as one more term.
     """
     scale, bits = turns.bits + 8, turns.bits
-    quarter = floor((turns.lo + turns.hi) * Fraction(2) ** (turns.exp + 1) + Fraction(1, 2))
+    quarter = floor_of(floor_of(turns.lo + turns.hi, turns.exp + 2) + 1, -1)
     angle = (turns * 4 - number(quarter, bits)) * pi(scale) * number(Fraction(1, 2), bits)
-    lo, hi = (end * 2**scale for end in angle.ends)
-    m, k, term, sums = floor((lo + hi) / 2), 0, 1 << scale, [0, 0]
-    radius = max(ceil(hi) - m, m - floor(lo))
+    m, up = floor_of(angle.lo + angle.hi, angle.exp + scale - 1), angle.exp + scale
+    radius = max(-floor_of(-angle.hi, up) - m, m - floor_of(angle.lo, up))
+    k, term, sums = 0, 1 << scale, [0, 0]
     require(radius >> scale == 0, Unproved("a phase is open"))
     while term:
         sums[k % 2] += term if k % 4 < 2 else -term
@@ -339,6 +345,7 @@ class Clock:
             self.pace, self.offset = (rounded(a.lo, a.hi, a.exp, bits) for a in (pace, offset))
             self.turn = number(1, bits) / self.pace
         self.omega = self.pace * pi(bits) * 2
+        self._circle: dict[tuple[int, int, int], list[tuple[Interval, Interval]]] = {}
 
     def spend(self, units: int) -> None:
         """Count work, for each line as a whole.
@@ -349,6 +356,13 @@ class Clock:
         self.scene.work[0] -= units
         require(self.scene.work[0] > 0, Unproved("the search takes too long"))
 
+    def circle(self, phase: Interval, n: int) -> Sequence[tuple[Interval, Interval]]:
+        """Enclose cosine and sine of k times a phase, for k = 1 to n; stretches share their ends."""
+        found = self._circle.setdefault((phase.lo, phase.hi, phase.exp), [])
+        for k in range(len(found) + 1, n + 1):
+            found.append(cos_sin(phase * k))
+        return found
+
     def waves(self, s: Interval, n: int) -> Iterator[list[Interval]]:
         """Enclose cosine and sine of k times the phase over a stretch, for k = 1 to n.
 
@@ -357,10 +371,11 @@ class Clock:
         quarters in a row hold all of these.
         """
         begin, end = self.offset + self.pace * s.low, self.offset + self.pace * s.high
-        one = number(1, self.bits)
+        one, at_begin, at_end = number(1, self.bits), self.circle(begin, n), self.circle(end, n)
         for k in range(1, n + 1):
-            first, last = cos_sin(begin * k), cos_sin(end * k)
-            quarters = range(ceil(4 * k * begin.ends[0]), floor(4 * k * end.ends[1]) + 1)[:4]
+            first, last = at_begin[k - 1], at_end[k - 1]
+            since, until = floor_of(-4 * k * begin.lo, begin.exp), floor_of(4 * k * end.hi, end.exp)
+            quarters = range(-since, until + 1)[:4]
             tops = [[one] * any(q % 4 == top for q in quarters) for top in (0, 1)]
             lows = [[-one] * any(q % 4 == low for q in quarters) for low in (2, 3)]
             yield [join(first[i], last[i], *tops[i], *lows[i]) for i in (0, 1)]

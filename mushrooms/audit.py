@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 from rich import progress
@@ -19,7 +19,7 @@ from conformance.audit.claim import AuditSteppers, Claim
 from conformance.audit.claims import all_claims, select_claims
 from conformance.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
 from conformance.audit.session import AuditResult, AuditSettings
-from conformance.files import write_files
+from conformance.files import named
 from fast import Ensemble
 from fast.ensemble import SHARE
 from mushrooms.audit_ensemble import Options, audit_ensemble
@@ -30,6 +30,7 @@ from mushrooms.output import (
     progress_bar,
     refuse_unheeded,
     writable_folder,
+    write_report,
 )
 from mushrooms.reports import audit_page
 from mushrooms.store import conduct
@@ -94,17 +95,8 @@ def _audit_paper(
             path.unlink(missing_ok=True)
         result = _conduct(folder, settings, claims)
         data = audit_page.to_data(result)
-        texts = {
-            "report.json": audit_page.to_json(data),
-            "report.html": audit_page.to_html(data, result.samples),
-            "report.txt": audit_page.to_text(data),
-        }
-        write_files(folder, texts)
-    if as_json:
-        print(texts["report.json"], end="")
-    else:
-        print(texts["report.txt"], end="")
-        print(f"Report: {folder / 'report.html'}")
+        page = audit_page.to_html(data, result.samples)
+        write_report(folder, audit_page.to_json(data), audit_page.to_text(data), page, as_json)
     return 0 if result.is_passed else 1
 
 
@@ -124,7 +116,7 @@ def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -
                 simulate_run=lambda name: partial(follow_run, folder / FOLDER / name, settings.resume),
                 progress=_watch_runs(bar),
             )
-    except KeyboardInterrupt as error:
+    except (KeyboardInterrupt, OSError) as error:
         error.add_note("finished parts are in the folder of the report: --resume continues the audit")
         raise
 
@@ -145,14 +137,8 @@ def _check_report(folder: Path, wanted: set[str]) -> None:
 
 def _watch_runs(bar: progress.Progress) -> Callable[[str, int, int], None]:
     """Return what moves a bar for each run."""
-    watches: dict[str, Watch] = {}
-
-    def advance(run: str, n_done: int, n_total: int) -> None:
-        if run not in watches:
-            watches[run] = Watch(bar, run, "particles")
-        watches[run].update(n_done, n_total)
-
-    return advance
+    watch_of = cache(partial(Watch, bar, unit="particles"))
+    return lambda run, n_done, n_total: watch_of(run).update(n_done, n_total)
 
 
 FOLDER = "runs"
@@ -214,13 +200,10 @@ def follow_run(
     spec = RunSpec(scene, energy, n_cycles, seed, phases)
     line = spec.command(scene.name, n_particles, place)
     default = block_size(spec, n_particles, threads or os.cpu_count() or 1)
-    with writable_folder(place), locked(place):
+    with writable_folder(place), locked(place), named(place):
         run = conduct.open_or_create(place, spec, n_particles, None, default, line, resume, at_least=True)
-        try:
-            conduct.complete(run, conduct.in_process(threads), progress, n_particles=n_particles)
-        except OSError as error:
-            why = error.strerror or error
-            raise BadInput(f"output {str(place)!r}: {why}; --resume takes up what is kept") from None
+        engine = partial(conduct.in_process, threads=threads)
+        conduct.complete(run, engine, progress, n_particles=n_particles)
         return run.ensemble(n_particles)
 
 

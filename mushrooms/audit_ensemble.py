@@ -8,7 +8,6 @@ captured (0 or 1), and x0, y0, where it started. The names that `mushrooms expor
 from __future__ import annotations
 
 import csv
-import json
 import re
 from collections.abc import Iterable, Iterator
 from itertools import islice, pairwise
@@ -18,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 import zarr
+from matplotlib import rc_context
 
 from conformance.audit.claim import Check
 from conformance.audit.ensemble import (
@@ -31,11 +31,14 @@ from conformance.audit.ensemble import (
     reversal,
 )
 from conformance.audit.runs import scene_named
-from conformance.files import write_files
 from conformance.suite.sheet import read_number, read_rows
 from mushrooms import output
+from mushrooms.figures import energies
+from mushrooms.figures.style import ORANGE, SKY, STYLE, new_figure, svg
 from mushrooms.output import import_arrow
-from mushrooms.reports.page import pull
+from mushrooms.reports import audit_page
+from mushrooms.reports.audit_page import expected_text, figures_text, power_text
+from mushrooms.reports.page import embed, pull, render
 from scene.refusal import BadInput, shown
 from scene.tables import Mushroom
 
@@ -47,6 +50,10 @@ PART, FEW = 500_000, 20_000  # rows read at a time: as arrays, and as texts
 SAME = 1e-6  # relative difference of E0 that writing it in few digits makes
 NOTHING = ("", "nan", "NaN", "NA", "null", "none", "None")
 FLAGS = {"true": "1", "false": "0", "t": "1", "f": "0", "yes": "1", "no": "0"}
+N_BINS = 50
+MOST_DRAWN = 1_000_000  # values that a histogram is of; of more, evenly spaced ones
+SIGNS = {True: ("✓", "good"), False: ("✗", "bad"), None: ("?", "open")}
+WORDS = {True: "holds", False: "FAILS", None: "open"}
 ENERGIES, GAIN = "E1", "s"
 # What a column may be called; of several minima of nu or capture intervals the earliest counts.
 NAMES = {
@@ -101,17 +108,9 @@ def audit_ensemble(
     with output.writable_folder(out) as folder:
         result = examine(path, found, reversed_path, options)
         data = to_data(result, path, scene_name)
-        from mushrooms.reports import ensemble_page  # it draws, and drawing takes a second to import
-
-        texts = {
-            "report.json": json.dumps(data, indent=1, ensure_ascii=False) + "\n",
-            "report.txt": ensemble_page.to_text(data),
-            "report.html": ensemble_page.to_html(data, result.given),
-        }
-        write_files(folder, texts)
-    print(texts["report.json" if as_json else "report.txt"], end="")
-    if not as_json:
-        print(f"Report: {folder / 'report.html'}")
+        output.write_report(
+            folder, audit_page.to_json(data), to_text(data), to_html(data, result.given), as_json
+        )
     return 0 if result.verdict == "confirmed" else 1
 
 
@@ -191,6 +190,57 @@ def to_data(result: EnsembleAudit, path: Path, scene_name: str) -> dict[str, Any
         "causes": result.causes,
         "checks": [{**check._asdict(), "pull": pull(check)} for check in result.checks],
     }
+
+
+def to_html(data: dict[str, Any], given: GivenEnsemble) -> str:
+    """Return the page."""
+    gain = given.s[:: 1 + (len(given.s) - 1) // MOST_DRAWN]
+    first = svg(energies.histogram(given.scene, given.energy, gain))
+    times = capture_times(given)
+    return render(
+        "ensemble.html.jinja",
+        report=data,
+        signs=SIGNS,
+        energies=embed(first),
+        times=embed(times) if times else None,
+    )
+
+
+def to_text(data: dict[str, Any]) -> str:
+    """Return the report as lines."""
+    lines = [
+        f"{data['ensemble']} against {data['scene']}: {data['verdict']}",
+        f"{data['particles']:,} particles, {data['lost']:,} without an energy",
+        *(f"note: {note}" for note in data["notes"]),
+    ]
+    for check in data["checks"]:
+        found = f"{figures_text(check)}, must be {expected_text(check)}"
+        found += f"; left out {check['band']:.2g}" if check["band"] else ""
+        found += f"; pull {check['pull']:+.1f}" if check["pull"] is not None else ""
+        found += f"; detects {power_text(check)}" if check["sees"] is not None else ""
+        lines.append(f"{WORDS[check['holds']]:5}  {check['what']}: {found}")
+    lines += [f"likely cause: {cause}" for cause in data["causes"]]
+    if data["verdict"] == "refuted" and not data["causes"]:
+        lines.append("likely cause: none of those that are known")
+    return "\n".join(lines) + "\n"
+
+
+@rc_context(STYLE)
+def capture_times(given: GivenEnsemble) -> bytes | None:
+    """Draw when particles were captured, with theory over it; None where nothing tells."""
+    t = np.empty(0) if given.t_in is None else given.t_in[np.isfinite(given.t_in)]
+    if len(t) < 2 or t.min() == t.max():
+        return None
+    figure, axes = new_figure(4.8, 3.2)
+    edges = np.linspace(t.min(), t.max(), N_BINS + 1)
+    axes.stairs(np.histogram(t, edges, density=True)[0], edges, fill=True, color=SKY, label="ensemble")
+    theirs = expected(given.scene, given.energy)
+    if theirs.p_nc < 1:
+        mass = np.diff(theirs.capture_cdf(edges)) / np.diff(edges)
+        axes.stairs(mass, edges, color=ORANGE, baseline=None, label="theory")
+    axes.set(xlabel="time of capture", ylabel="density")
+    axes.legend(loc="best")
+    return svg(figure)
 
 
 def read_table(path: Path, scene: Mushroom, energy: float | None, unit: float) -> tuple[GivenEnsemble, int]:

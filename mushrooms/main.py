@@ -24,6 +24,13 @@ PROGRAM = "mushrooms"
 # Typer 0.26 carries a click of its own, older ones import it: this is the error class of the one in use.
 UsageError: type[Any] = typer.BadParameter.__bases__[0]
 REFUSED, INTERRUPTED = 2, 130
+# What ends a command through no fault of its input, in words.
+ENDS: dict[type[Exception], str] = {
+    EOFError: "a file or stream ended too soon",
+    BrokenExecutor: "a process of this run was ended from outside",
+    MemoryError: "not enough memory",
+    RecursionError: "nested too deeply",
+}
 
 
 def run(arguments: list[str] | None = None) -> NoReturn:
@@ -54,12 +61,8 @@ def _call(given: list[str]) -> NoReturn:
         code = _tell(REFUSED, error.format_message())
     except OSError as error:
         code = _tell(REFUSED, _format_error(error), error)
-    except EOFError as error:
-        code = _tell(REFUSED, f"a file or stream ended too soon: {error}")
-    except BrokenExecutor as error:
-        code = _tell(REFUSED, f"a process of this run was ended from outside: {error}")
-    except (MemoryError, RecursionError) as error:
-        what = "not enough memory" if isinstance(error, MemoryError) else "nested too deeply"
+    except tuple(ENDS) as error:
+        what = next(words for kind, words in ENDS.items() if isinstance(error, kind))
         code = _tell(REFUSED, f"{what}: {error}".removesuffix(": "))
     except ValueError as error:
         from scene.refusal import BadInput  # not above: the list of commands needs no scene

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO, TextIO
 from rich import progress
 from rich.console import Console
 
-from conformance.files import named, part
+from conformance.files import named, part, write_files
 from scene import BadInput
 
 FIRST, EVERY = 20.0, 60.0  # seconds to the first line, and between lines, where there is no terminal
@@ -158,6 +158,14 @@ def _rounded(name: str, pairs: dict[str, Any]) -> str:
     return f"{value:.{max(places, 0)}f}"
 
 
+def write_report(folder: Path, data: str, text: str, page: str, as_json: bool) -> None:
+    """Write report.json, report.txt and report.html together, and print one of the first two."""
+    write_files(folder, {"report.json": data, "report.txt": text, "report.html": page})
+    print(data if as_json else text, end="")
+    if not as_json:
+        print(f"Report: {folder / 'report.html'}")
+
+
 LOCK = ".lock"
 
 
@@ -178,9 +186,7 @@ def writable_folder(path: Path) -> Iterator[Path]:
         folder = folder.parent
     try:
         path.mkdir(parents=True, exist_ok=True)
-        probe = part(path / "probe")
-        probe.write_bytes(b"")
-        probe.unlink()
+        _probe(path / "probe")
     except (FileExistsError, NotADirectoryError):
         raise BadInput(f"output {str(path)!r}: {str(folder)!r} is a file, must be a folder") from None
     except OSError as error:
@@ -254,11 +260,14 @@ def check_file(path: Path | None, suffixes: tuple[str, ...]) -> None:
     if path.is_dir():
         raise BadInput(f"output {str(path)!r} is a folder, must be a file")
     try:
-        probe = part(path)
-        probe.write_bytes(b"")
-        probe.unlink()
+        _probe(path)
     except OSError as error:
         raise BadInput(f"output {str(path)!r} cannot be written: {error.strerror}") from None
+
+
+def _probe(path: Path) -> None:
+    part(path).write_bytes(b"")
+    part(path).unlink()
 
 
 def import_arrow() -> tuple[Any, Any]:

@@ -176,11 +176,10 @@ def verify_file(file: Path, scene: str | None, picture: Path | None) -> int:
     label = f"trajectory {str(file)!r}"
     if (file.suffix == ".csv") != (scene is not None):
         raise BadInput(f"{label}: a CSV file needs --scene, a JSON file has its own")
+    rows = None if scene is None else _of_rows(file, label, scene)
     try:
-        text = file.read_text("utf-8") if scene is None else json.dumps(_of_rows(file, label, scene))
+        text = file.read_text("utf-8") if rows is None else json.dumps(rows)
         verdicts = list(verifier.verify_answers(text))
-    except BadInput:
-        raise
     except (verifier.Refused, verifier.Unproved, ValueError, RecursionError) as error:
         raise BadInput(f"{label}: {error}") from None
     for place, verdict in verdicts:

@@ -6,6 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -176,9 +177,9 @@ def _how_to_resume(run: StoredRun, command: str) -> str:
 def _complete(arguments: CliArgs, run: StoredRun) -> None:
     """Follow what a run lacks."""
     before, seconds = run.tally, run.seconds
-    engine = conduct.in_process(arguments.threads)
+    engine: conduct.Engine = partial(conduct.in_process, threads=arguments.threads)
     if arguments.dask:
-        engine = conduct.by_dask(arguments.dask, arguments.threads)
+        engine = partial(conduct.by_dask, address=arguments.dask, threads=arguments.threads)
     with announce_compilation(), progress_bar() as bar:
         conduct.complete(
             run,

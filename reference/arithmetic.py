@@ -9,7 +9,6 @@ different precisions do not disturb each other, and mpmath's global precision is
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Sequence
 from decimal import Decimal
 from fractions import Fraction
@@ -18,7 +17,7 @@ from typing import Any, NamedTuple
 import mpmath
 from mpmath.libmp import libelefun, libmpf, libmpi
 
-from scene.precision import intervals
+from scene.precision import CONSTANTS, intervals
 
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
@@ -28,9 +27,6 @@ BITS_PER_DIGIT = 3.3219280948873626
 MAX_WORK = 50_000.0
 LONG_NUMBER = 1024  # bits; arithmetic with so long a number takes twice as long as with a short one
 _FLOOR, _CEILING = "f", "c"
-# mpmath keeps pi and the precision it was computed to in two variables that all contexts share:
-# a thread that reads one before and the other after a change would get a wrong pi.
-_CONSTANTS = threading.Lock()
 
 
 class Undecidable(Exception):  # noqa: N818 (not an error of the caller: precision is raised)
@@ -215,9 +211,8 @@ class Arithmetic:
         if libmpf.mpf_gt(libmpf.mpf_sub(b, a, 30, _FLOOR), libmpf.from_int(3)):
             whole = self.context.mpf([-1, 1])
             return whole, whole
-        with _CONSTANTS:
-            cos, sin = libmpi.mpi_cos_sin(x._mpi_, self.prec)
-        return self.context.make_mpf(cos), self.context.make_mpf(sin)
+        cos, sin = self.context.cos_sin(x)
+        return cos, sin
 
     def turning(
         self, omega: float | None, period: float | None, instant: Fraction
@@ -243,19 +238,8 @@ class Arithmetic:
         ends = [angle - 2 * n * half_turn for half_turn in half_turns]
         return self.number(omega), self.between(min(ends), max(ends))
 
-    def period(self, omega: float | None, length: Fraction | None) -> Interval:
-        """Enclose a period, given as itself or by its angular frequency."""
-        if length is not None:
-            return self.number(length)
-        assert omega is not None
-        return 2 * self._pi(self.prec) / self.number(omega)
-
-    def is_full_turn(self, omega: Interval, length: Fraction) -> bool:
-        """Tell whether omega times a length of time is 2 pi or more; 7 is required, to be safe."""
-        return not libmpf.mpf_lt((omega * self.number(length))._mpi_[0], libmpf.from_int(7))
-
     def _pi(self, bits: int) -> Interval:
-        with _CONSTANTS:
+        with CONSTANTS:
             low, high = libelefun.mpf_pi(bits, _FLOOR), libelefun.mpf_pi(bits, _CEILING)
         return self.context.make_mpf((low, high))
 

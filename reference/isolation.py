@@ -124,8 +124,7 @@ class Isolator:
             if is_excluded or self._is_never_reached(a, b):
                 self.reached, self.n_excluded = b, self.n_excluded + 1
                 continue
-            is_falling = jet.d1 is not None and sign(jet.d1) < 0
-            if is_falling and not self._may_begin(a) and sign(self.value(b)) < 0:
+            if sign(jet.d1) < 0 and not self._may_begin(a) and sign(self.value(b)) < 0:
                 return a, b
             parts = self._parts(a, b, whole, jet)
             self._require_rise(a, b, cut=parts[0][1])
@@ -135,7 +134,7 @@ class Isolator:
     def _sharpened(self, a: Interval, b: Interval, whole: Interval) -> Jet:
         """Evaluate f and its derivatives over an interval; f' from its ends where it is monotonic."""
         jet = self.jet(whole)
-        if jet.d1 is None or jet.d2 is None or sign(jet.d1) != 0 or sign(jet.d2) == 0:
+        if sign(jet.d1) != 0 or sign(jet.d2) == 0:
             return jet
         first, last = self.jet(a).d1, self.jet(b).d1
         return jet._replace(d1=self.arithmetic.intersection(jet.d1, self.arithmetic.union([first, last])))
@@ -148,18 +147,14 @@ class Isolator:
         """
         arithmetic, middle = self.arithmetic, self.arithmetic.middle(whole)
         there, away = self.jet(middle), whole - middle
-        d1, f = jet.d1, there.f
-        if there.d1 is not None:
-            f = f + there.d1 * away
-        if there.d1 is not None and jet.d1 is not None and jet.d2 is not None:
-            d1 = arithmetic.intersection(jet.d1, there.d1 + jet.d2 * away)
-            f = f + jet.d2 * arithmetic.square(away) / 2
+        d1 = arithmetic.intersection(jet.d1, there.d1 + jet.d2 * away)
+        f = there.f + there.d1 * away + jet.d2 * arithmetic.square(away) / 2
         return jet._replace(f=arithmetic.intersection(jet.f, f), d1=d1)
 
     @staticmethod
     def _falls_or_bends_down(jet: Jet) -> bool:
         """Tell whether f' < 0 or f'' <= 0 is known; f > 0 is then asked for at the end alone."""
-        return (jet.d1 is not None and sign(jet.d1) < 0) or jet.d2 is None or is_at_most_zero(jet.d2)
+        return sign(jet.d1) < 0 or is_at_most_zero(jet.d2)
 
     def _may_begin(self, a: Interval) -> bool:
         """Tell whether the flight may begin, on this wall, at a or later."""
@@ -176,22 +171,20 @@ class Isolator:
         if not self._may_begin(a) or holds_all:
             return
         for point in (a, cut, latest if is_below(latest, b) else b):
-            rate = self.jet(point).d1
-            if self._may_begin(point) and (rate is None or sign(rate) <= 0):
+            if self._may_begin(point) and sign(self.jet(point).d1) <= 0:
                 raise Undecidable("the flight begins along its wall, as far as this precision shows")
 
     def _is_excluded(self, a: Interval, b: Interval, jet: Jet) -> bool:
         """Tell whether f and its derivatives prove f > 0 on (a, b]."""
-        slope = self.arithmetic.zero if jet.d1 is None else jet.d1
-        is_concave = jet.d2 is None or is_at_most_zero(jet.d2)
-        if sign(slope) > 0:
+        is_concave = is_at_most_zero(jet.d2)
+        if sign(jet.d1) > 0:
             return True
         if self._may_begin(a):
-            if self.is_flat and jet.d2 is not None and sign(jet.d2) > 0:
+            if self.is_flat and sign(jet.d2) > 0:
                 return True
             is_all_within = is_below(self.begin, b) and not is_below(self.arithmetic.lower(self.begin), a)
             return is_concave and is_all_within and sign(self.value(b)) > 0
-        return self._sign_of(jet.f) > 0 or ((sign(slope) < 0 or is_concave) and sign(self.value(b)) > 0)
+        return self._sign_of(jet.f) > 0 or ((sign(jet.d1) < 0 or is_concave) and sign(self.value(b)) > 0)
 
     def _is_never_reached(self, a: Interval, b: Interval) -> bool:
         """Tell whether the wall never comes, over at least a period, to where the flight is at a nor at b."""
@@ -202,8 +195,7 @@ class Isolator:
 
     def _parts(self, a: Interval, b: Interval, whole: Interval, jet: Jet) -> list[tuple[Interval, Interval]]:
         """Cut an interval: around its least value where f is convex, at a knot, or half way."""
-        is_convex = jet.d2 is not None and sign(jet.d2) > 0
-        if is_convex and jet.d1 is not None and sign(jet.d1) == 0 and not self._may_begin(a):
+        if sign(jet.d2) > 0 and sign(jet.d1) == 0 and not self._may_begin(a):
             low, high = self._bottom(whole)
             if is_below(a, low) and is_below(high, b):
                 return [(a, low), (low, high), (high, b)] if is_below(low, high) else [(a, low), (low, b)]
@@ -220,8 +212,6 @@ class Isolator:
         where = whole
         for _ in range(MAX_NEWTON):
             there, over = self.jet(self.arithmetic.middle(where)), self.jet(where)
-            assert there.d1 is not None
-            assert over.d2 is not None
             image = self.arithmetic.middle(where) - there.d1 / over.d2
             if is_below(image, where) or is_below(where, image):
                 break
@@ -312,7 +302,7 @@ class Isolator:
             lower, upper = self.arithmetic.lower(wider), self.arithmetic.upper(wider)
             slope = self.jet(wider).d1
             is_later = is_below(a, lower) and is_below(self.arithmetic.upper(self.begin), lower)
-            if not is_later or slope is None or sign(slope) >= 0:
+            if not is_later or sign(slope) >= 0:
                 raise Undecidable("the signs around the root are not strict")
             if sign(self.value(lower)) > 0 > sign(self.value(upper)):
                 return IsolatedRoot(wider, slope)

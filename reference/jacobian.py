@@ -13,7 +13,6 @@ binary64 resolves the time of the hit, so both sides' derivatives are enclosed t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from fractions import Fraction
 
 from reference.arithmetic import Arithmetic, Enclosure, Interval, exact_ends
@@ -91,17 +90,9 @@ def chained(later: Matrix, earlier: Matrix) -> Matrix:
         later: Jacobian of the last step.
         earlier: d(t, x, y, vx, vy) at its start / d(initial state).
     """
-    rows = [[sum_of(a * b[j] for a, b in zip(row, earlier, strict=True)) for j in range(5)] for row in later]
+    rows = [[sum(a * b[j] for a, b in zip(row, earlier, strict=True)) for j in range(5)] for row in later]
     rows[0] = [a + b for a, b in zip(rows[0], earlier[0], strict=True)]
     return rows
-
-
-def sum_of(terms: Iterator[Interval]) -> Interval:
-    """Add intervals (the built-in sum would begin with a plain 0)."""
-    total = next(terms)
-    for term in terms:
-        total = total + term
-    return total
 
 
 def identity(arithmetic: Arithmetic) -> Matrix:

@@ -16,10 +16,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import reduce
 from math import lcm
 from typing import NamedTuple
 
-from scene import Cap, Fourier, Law, Scene, State, Stem, Wall
+from reference.jets import Jet, multiply
+from reference.walls import wall_function
+from scene import Cap, Fourier, Law, Scene, State, Wall
 from scene.laws import Quadratic, is_constant, piece_at
 from scene.tables import laws, width_factors
 
@@ -116,15 +119,7 @@ def _is_zero_sum(factors: dict[Fraction, Fraction]) -> bool:
     return not any(sums)
 
 
-class ExactJet(NamedTuple):
-    """Value, first and second derivative."""
-
-    f: ExactNumber
-    d1: ExactNumber
-    d2: ExactNumber
-
-
-def law_jet(law: Law, time: Fraction) -> ExactJet:
+def law_jet(law: Law, time: Fraction) -> Jet:
     """Return a law and its derivatives just after `time`."""
     piece = piece_at(law, time)
     if isinstance(piece, Quadratic):
@@ -148,44 +143,26 @@ def law_jet(law: Law, time: Fraction) -> ExactJet:
             waves = ((Wave(0, k * angle, order - turn, is_part), Fraction(c)) for turn, c in ((0, a), (1, b)))
             totals[order] += factor * _collected(waves)
             factor *= frequency * exact(k)
-    return ExactJet(*totals)
+    return Jet(*totals)
 
 
-def _rational_jet(f: Fraction, d1: Fraction = Fraction(0), d2: Fraction = Fraction(0)) -> ExactJet:
-    return ExactJet(exact(f), exact(d1), exact(d2))
+def _rational_jet(f: Fraction, d1: Fraction = Fraction(0), d2: Fraction = Fraction(0)) -> Jet:
+    return Jet(exact(f), exact(d1), exact(d2))
 
 
-def _product(p: ExactJet, q: ExactJet) -> ExactJet:
-    return ExactJet(p.f * q.f, p.d1 * q.f + p.f * q.d1, p.d2 * q.f + exact(2) * p.d1 * q.d1 + p.f * q.d2)
-
-
-def _sum(*jets: ExactJet) -> ExactJet:
-    return ExactJet(*(sum(parts, exact(0)) for parts in zip(*jets, strict=True)))
-
-
-def _negative(jet: ExactJet) -> ExactJet:
-    return ExactJet(-jet.f, -jet.d1, -jet.d2)
-
-
-def wall_jet(scene: Scene, state: State, wall: Wall, s: Fraction) -> ExactJet:
+def wall_jet(scene: Scene, state: State, wall: Wall, s: Fraction) -> Jet:
     """Return f, f', f'' of a wall at flight time s, exactly."""
-    vx, vy = Fraction(state.vx), Fraction(state.vy)
-    time = Fraction(state.t) + s
-    height = _rational_jet(Fraction(state.y) + vy * s, vy)
-    across = _rational_jet(Fraction(state.x) + vx * s, vx)
-    if wall == "base":
-        return _negative(height) if isinstance(scene, Stem) else height
-    found = {name: law_jet(law, time) for name, law in laws(scene).items()}
-    if wall == "arc":
-        r = found["r"]
-        return _sum(_product(r, r), _negative(_product(across, across)), _negative(_product(height, height)))
-    if wall == "floor":
-        return _sum(height, found["h"])
-    assert not isinstance(scene, Cap)
-    width = _rational_jet(Fraction(1))
-    for law in width_factors(scene):
-        width = _product(width, law_jet(law, time))
-    return _sum(width, _product(found["slope"], height), _negative(across) if wall == "right" else across)
+    time, vx, vy = Fraction(state.t) + s, Fraction(state.vx), Fraction(state.vy)
+    x = _rational_jet(Fraction(state.x) + vx * s, vx)
+    y = _rational_jet(Fraction(state.y) + vy * s, vy)
+
+    def law(name: str) -> Jet:
+        if name != "w":
+            return law_jet(laws(scene)[name], time)
+        assert not isinstance(scene, Cap)
+        return reduce(multiply, (law_jet(factor, time) for factor in width_factors(scene)))
+
+    return wall_function(scene, wall, x, y, law, lambda p: multiply(p, p))
 
 
 def crossing_time(state: State) -> Fraction | None:
@@ -212,5 +189,7 @@ def straight_time(scene: Scene, state: State, wall: Wall) -> Fraction | None:
 
 def is_zero(scene: Scene, state: State, wall: Wall, s: Fraction) -> bool:
     """Tell whether f, less its residual f(0) on the wall being left, is known to vanish exactly at s."""
-    f = wall_jet(scene, state, wall, s).f
-    return (f if wall != state.wall else f + -wall_jet(scene, state, wall, Fraction(0)).f).is_zero()
+    f: ExactNumber = wall_jet(scene, state, wall, s).f
+    if wall == state.wall:
+        f += -wall_jet(scene, state, wall, Fraction(0)).f
+    return f.is_zero()

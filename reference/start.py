@@ -134,7 +134,7 @@ def _is_beside_mouth(scene: Scene, state: State, motion: MovingWalls) -> bool:
 def _judge_rise(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> Undefined | bool:
     """Judge f' at the start on a wall: True if f' = 0 and f'' > 0, False if f' > 0."""
     jet = motion.wall(wall, motion.arithmetic.zero)
-    rise = sign(jet.d1) if jet.d1 is not None else 0
+    rise = sign(jet.d1)
     if rise > 0:
         return False
     if rise < 0:

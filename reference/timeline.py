@@ -8,30 +8,16 @@ at every time except knots.
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from fractions import Fraction
-from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from itertools import pairwise
+from typing import Any
 
 from reference.arithmetic import Arithmetic, Interval, exact_ends
 from reference.jets import Jet, united
 from reference.waves import Waves
 from scene import BangBang, Fourier, Law, Scene
-from scene.laws import is_constant
+from scene.laws import Quadratic, breakpoints, is_constant, leg_at
 from scene.tables import laws, period
-
-
-class LawInTime(Protocol):
-    """A law as a function of the time since an instant."""
-
-    def jet(self, s: Interval) -> Jet:
-        """Enclose the law and its derivatives at every time within s."""
-
-    def knots(self, low: Fraction, high: Fraction) -> list[Fraction]:
-        """List the times strictly between at which the law changes its piece."""
-
-    def is_whole(self, length: Fraction) -> bool:
-        """Tell whether a law takes all its values within any time of this length, as evaluated."""
 
 
 class Timeline:
@@ -46,7 +32,7 @@ class Timeline:
     def __init__(self, arithmetic: Arithmetic, scene: Scene, instant: Fraction) -> None:
         self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in laws(scene).items()}
         shared = period(scene)
-        length = None if shared is None else arithmetic.period(shared.omega, shared.length)
+        length = None if shared is None else shared.value(arithmetic.context)
         self.turn = None if length is None else arithmetic.upper(length)  # a period at least
         self._arithmetic = arithmetic
         # Particles at rest at several places ask for the same parts of a period.
@@ -84,7 +70,7 @@ class Constant:
     """A law that never changes."""
 
     def __init__(self, arithmetic: Arithmetic, value: float) -> None:
-        self.value = Jet(arithmetic.number(value), None, None)
+        self.value = Jet(arithmetic.number(value), arithmetic.zero, arithmetic.zero)
 
     def jet(self, s: Interval) -> Jet:
         """Return the constant."""
@@ -99,87 +85,60 @@ class Constant:
         return True
 
 
-class HalfLeg(NamedTuple):
-    """Half a leg of a bang-bang law: value + bend u^2 / 2, u the time from its knot `origin`."""
-
-    start: Fraction
-    end: Fraction
-    origin: Fraction
-    value: Fraction
-    bend: Fraction
-
-
-@lru_cache(maxsize=256)
-def half_legs(law: BangBang) -> tuple[HalfLeg, ...]:
-    """Cut a bang-bang law into its parabolas, in the period that begins at its first knot."""
-    found = []
-    for (t0, v0), (t1, v1) in zip(law.knots, law.knots[1:], strict=False):
-        start, end, before, after = (Fraction(number) for number in (t0, t1, v0, v1))
-        middle, length = (start + end) / 2, end - start
-        bend = 4 * (after - before) / (length * length)
-        found += [HalfLeg(start, middle, start, before, bend), HalfLeg(middle, end, end, after, -bend)]
-    return tuple(found)
-
-
 class Legs:
     """A bang-bang law: parabolas that join smoothly."""
 
     def __init__(self, arithmetic: Arithmetic, law: BangBang, instant: Fraction) -> None:
-        self.arithmetic = arithmetic
-        self.halves = half_legs(law)
-        self.starts = [half.start for half in self.halves]
-        self.period = self.halves[-1].end - self.halves[0].start
-        self.instant = instant
-        number = arithmetic.number
-        self.values = [number(half.value) for half in self.halves]
-        self.bends = [number(half.bend) for half in self.halves]
+        self.arithmetic, self.law, self.instant = arithmetic, law, instant
+        self.period = Fraction(law.knots[-1][0]) - Fraction(law.knots[0][0])
 
     def jet(self, s: Interval) -> Jet:
         """Unite the parabolas that times within s may lie on."""
         low, high = (self.instant + end for end in exact_ends(s))
         if high - low >= self.period:
             return self._whole()
-        turn = (low - self.starts[0]) // self.period * self.period
-        i = bisect_right(self.starts, low - turn) - 1
-        if self.halves[i].end + turn >= high:
-            return self._on(i, turn, s)
         parts = []
         while True:
-            start, end = self.halves[i].start + turn, self.halves[i].end + turn
-            part = max(start, low) - self.instant, min(end, high) - self.instant
-            parts.append(self._on(i, turn, self.arithmetic.between(*part)))
-            if end >= high:
+            piece = leg_at(self.law, low)
+            stop = min(piece.end, high)
+            part = self.arithmetic.between(low - self.instant, stop - self.instant)
+            parts.append(self._on(piece, part))
+            if stop == high:
                 return united(self.arithmetic, parts)
-            i += 1
-            if i == len(self.halves):
-                i, turn = 0, turn + self.period
+            low = stop
 
-    def _on(self, i: int, turn: Fraction, s: Interval) -> Jet:
+    def _on(self, piece: Quadratic, s: Interval) -> Jet:
         """Evaluate one parabola at times since the instant."""
         self.arithmetic.spend(1)
-        u = self.arithmetic.number(self.instant - self.halves[i].origin - turn) + s
-        bend = self.bends[i]
-        return Jet(self.values[i] + bend * self.arithmetic.square(u) / 2, bend * u, bend)
+        number = self.arithmetic.number
+        u, bend = number(self.instant - piece.origin) + s, number(2 * piece.c2)
+        return Jet(number(piece.c0) + bend * self.arithmetic.square(u) / 2, bend * u, bend)
 
     def _whole(self) -> Jet:
         """Enclose the law over all of its period."""
-        arithmetic, halves = self.arithmetic, self.halves
+        arithmetic = self.arithmetic
         arithmetic.spend(1)
-        speed = max(abs(half.bend) * (half.end - half.start) for half in halves)
-        bend = max(abs(half.bend) for half in halves)
+        legs = [(leg_at(self.law, start), end - start) for start, end in pairwise(breakpoints(self.law))]
+        speed = max(abs(2 * piece.c2) * length for piece, length in legs)
+        bend = max(abs(2 * piece.c2) for piece, _ in legs)
         both = arithmetic.context.mpf([-1, 1])
-        whole = arithmetic.union(self.values)
+        whole = arithmetic.union([arithmetic.number(piece.c0) for piece, _ in legs])
         return Jet(whole, arithmetic.number(speed) * both, arithmetic.number(bend) * both)
 
     def knots(self, low: Fraction, high: Fraction) -> list[Fraction]:
         """List the ends of parabolas strictly between two times since the instant, within a period."""
+        found: list[Fraction] = []
         if high - low >= self.period:
-            return []
-        first = self.instant + low
-        turn = (first - self.starts[0]) // self.period * self.period - self.instant
-        ends = (half.end + turn + shift for shift in (Fraction(0), self.period) for half in self.halves)
-        return [end for end in ends if low < end < high]
+            return found
+        end = leg_at(self.law, self.instant + low).end
+        while end < self.instant + high:
+            found.append(end - self.instant)
+            end = leg_at(self.law, end).end
+        return found
 
     def is_whole(self, length: Fraction) -> bool:
         """Tell whether the length is a period or more."""
         return length >= self.period
+
+
+LawInTime = Constant | Legs | Waves  # a law as a function of the time since an instant

@@ -7,8 +7,10 @@ With an interval of flight times, each enclosure holds over all of it, knots inc
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from fractions import Fraction
+from functools import partial
 from typing import Any, NamedTuple
 
 from reference.arithmetic import Arithmetic, Interval
@@ -35,13 +37,41 @@ class EnclosedFlight(NamedTuple):
     begin: Interval
 
 
+def wall_function(
+    scene: Scene,
+    wall: Wall,
+    x: Jet,
+    y: Jet,
+    law: Callable[[str], Jet],
+    square_of: Callable[[Jet], Jet],
+) -> Jet:
+    """Return f, f', f'' of a wall for a particle at (x, y).
+
+    Args:
+        scene: the table.
+        wall: one of its walls.
+        x: of the particle, as a function of time.
+        y: likewise.
+        law: returns a law by its name; `w` is the half-width of the mouth also where nu is given.
+        square_of: returns a square.
+    """
+    if wall == "base":
+        return negative(y) if isinstance(scene, Stem) else y
+    if wall == "floor":
+        return add(y, law("h"))
+    if wall == "arc":
+        return add(square_of(law("r")), negative(add(square_of(x), square_of(y))))
+    side = negative(x) if wall == "right" else x
+    return add(add(law("w"), multiply(law("slope"), y)), side)
+
+
 class MovingWalls:
     """Evaluates the walls along a flight."""
 
     def __init__(self, arithmetic: Arithmetic, scene: Scene, flight: EnclosedFlight) -> None:
         self.arithmetic = arithmetic
         self.flight = flight
-        self.is_stem = isinstance(scene, Stem)
+        self.scene = scene
         self.timeline = Timeline(arithmetic, scene, flight.instant)
         # Neighbouring intervals share ends, and later proofs reuse results of earlier ones.
         self._known: dict[tuple[Wall, Any], Jet] = {}
@@ -73,18 +103,13 @@ class MovingWalls:
         return self._known[key]
 
     def _evaluated(self, wall: Wall, s: Interval) -> Jet:
-        q = self.flight
-        y = Jet(q.y + q.vy * s, q.vy, None)
-        if wall == "base":
-            return negative(y) if self.is_stem else y
-        if wall == "floor":
-            return add(y, self.law("h", s))
-        x = Jet(q.x + q.vx * s, q.vx, None)
-        if wall == "arc":
-            radius = square(self.arithmetic, self.law("r", s))
-            return add(radius, negative(add(square(self.arithmetic, x), square(self.arithmetic, y))))
-        side = negative(x) if wall == "right" else x
-        return add(add(self.width(s), multiply(self.law("slope", s), y)), side)
+        q, zero = self.flight, self.arithmetic.zero
+        x, y = Jet(q.x + q.vx * s, q.vx, zero), Jet(q.y + q.vy * s, q.vy, zero)
+
+        def law(name: str) -> Jet:
+            return self.width(s) if name == "w" else self.law(name, s)
+
+        return wall_function(self.scene, wall, x, y, law, partial(square, self.arithmetic))
 
     def gradient(self, wall: Wall, s: Interval) -> tuple[Interval, Interval, Interval]:
         """Enclose the partial derivatives of f by x, y and t at flight time s."""
@@ -92,18 +117,14 @@ class MovingWalls:
         one = self.arithmetic.number(1)
         zero = self.arithmetic.zero
         if wall == "base":
-            return zero, -one if self.is_stem else one, zero
+            return zero, -one if isinstance(self.scene, Stem) else one, zero
         if wall == "floor":
-            return zero, one, self.law("h", s).d1 or zero
+            return zero, one, self.law("h", s).d1
         if wall == "arc":
             r = self.law("r", s)
-            f_t = zero if r.d1 is None else 2 * (r.f * r.d1)
-            return -2 * (q.x + q.vx * s), -2 * (q.y + q.vy * s), f_t
+            return -2 * (q.x + q.vx * s), -2 * (q.y + q.vy * s), 2 * (r.f * r.d1)
         slope, y = self.law("slope", s), q.y + q.vy * s
-        f_t = self.width(s).d1 or zero
-        if slope.d1 is not None:
-            f_t = f_t + slope.d1 * y
-        return (-one if wall == "right" else one), slope.f, f_t
+        return (-one if wall == "right" else one), slope.f, self.width(s).d1 + slope.d1 * y
 
     def hessian(self, wall: Wall, s: Interval) -> tuple[Interval, Interval, Interval, Interval]:
         """Enclose f_xx, f_yy, f_yt and f_tt at flight time s; the other second partials are 0."""
@@ -112,12 +133,9 @@ class MovingWalls:
         if wall == "base":
             return zero, zero, zero, zero
         if wall == "floor":
-            return zero, zero, zero, self.law("h", s).d2 or zero
+            return zero, zero, zero, self.law("h", s).d2
         if wall == "arc":
             two = self.arithmetic.number(-2)
-            return two, two, zero, square(self.arithmetic, self.law("r", s)).d2 or zero
+            return two, two, zero, square(self.arithmetic, self.law("r", s)).d2
         slope = self.law("slope", s)
-        f_tt = self.width(s).d2 or zero
-        if slope.d2 is not None:
-            f_tt = f_tt + slope.d2 * (q.y + q.vy * s)
-        return zero, zero, slope.d1 or zero, f_tt
+        return zero, zero, slope.d1, self.width(s).d2 + slope.d2 * (q.y + q.vy * s)

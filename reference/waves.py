@@ -14,7 +14,7 @@ from __future__ import annotations
 from fractions import Fraction
 from functools import cached_property
 
-from reference.arithmetic import Arithmetic, Interval, is_below, sign
+from reference.arithmetic import Arithmetic, Interval, exact_ends, is_below, sign
 from reference.jets import Jet
 from scene import Fourier
 
@@ -110,5 +110,5 @@ class Waves:
         return []
 
     def is_whole(self, length: Fraction) -> bool:
-        """Tell whether the length is a period or more."""
-        return self.arithmetic.is_full_turn(self.omega, length)
+        """Tell whether the length is a period or more: of its phase 7 are required, to be safe."""
+        return exact_ends(self.omega)[0] * length >= 7

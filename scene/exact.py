@@ -126,53 +126,36 @@ def _primitive(p: Polynomial) -> Polynomial:
     return [Fraction(a // shared) for a in integers]
 
 
-def remainder(p: Polynomial, q: Polynomial) -> Polynomial:
-    """Return a positive multiple of the remainder of p by q, with coprime integers.
+def divide(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
+    """Return quotient and remainder of p by q != 0, each up to a positive factor, with coprime integers.
 
-    The coefficients of p and q must be whole numbers, as `_primitive` leaves them. All intermediate ones are
-    whole too, because fractions would be reduced at every step.
+    All intermediate numbers are whole, because fractions would be reduced at every step.
     """
-    rest, divisor = [a.numerator for a in p], [b.numerator for b in q]
+    rest, divisor = ([a.numerator for a in _primitive(polynomial)] for polynomial in (p, q))
+    quotient = [0] * max(len(rest) - len(divisor) + 1, 0)
     size, sign = abs(divisor[-1]), 1 if divisor[-1] > 0 else -1
-    for shift in range(len(p) - len(q), -1, -1):
-        factor = sign * rest[shift + len(q) - 1]
-        rest = [size * a for a in rest]
+    for shift in reversed(range(len(quotient))):
+        factor = sign * rest[shift + len(divisor) - 1]
+        rest, quotient = [size * a for a in rest], [size * a for a in quotient]
+        quotient[shift] = factor
         for i, b in enumerate(divisor):
             rest[shift + i] -= factor * b
-    return _primitive(trimmed([Fraction(a) for a in rest]))
-
-
-def divide(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """Return quotient and remainder of p by q != 0."""
-    rest = list(p)
-    quotient = [Fraction(0)] * max(len(p) - len(q) + 1, 0)
-    for shift in range(len(p) - len(q), -1, -1):
-        factor = rest[shift + len(q) - 1] / q[-1]
-        quotient[shift] = factor
-        for i, b in enumerate(q):
-            rest[shift + i] -= factor * b
-    return trimmed(quotient), trimmed(rest[: len(q) - 1] if len(p) >= len(q) else rest)
-
-
-def squarefree(p: Polynomial) -> Polynomial:
-    """Return p without the multiplicities of its roots (up to a positive factor)."""
-    a, b = _primitive(p), _primitive(derivative(p))
-    while b:
-        a, b = b, remainder(a, b)
-    quotient = _primitive(divide(p, a)[0])
-    return quotient if (quotient[-1] > 0) == (p[-1] > 0) else scale(quotient, Fraction(-1))
+    return _primitive(trimmed(list(map(Fraction, quotient)))), _primitive(trimmed(list(map(Fraction, rest))))
 
 
 class Sturm:
-    """Counts the distinct real roots of a polynomial in intervals."""
+    """Counts the distinct real roots of a polynomial in intervals.
+
+    The chain of p and p' ends in their common divisor. Divided by it, its first part has each root of p once.
+    """
 
     def __init__(self, p: Polynomial) -> None:
         self.p = p
-        self.root_free_of_squares = squarefree(p)
-        chain = [self.root_free_of_squares, _primitive(derivative(self.root_free_of_squares))]
+        chain = [p, derivative(p)]
         while chain[-1]:
-            chain.append(scale(remainder(chain[-2], chain[-1]), Fraction(-1)))
-        self.chain = chain[:-1]
+            chain.append(scale(divide(chain[-2], chain[-1])[1], Fraction(-1)))
+        self.chain = [divide(part, chain[-2])[0] for part in chain[:-1]]
+        self.root_free_of_squares = self.chain[0]
         self._variations = cache(self._count_variations)  # intervals that are halved share their ends
 
     def _count_variations(self, x: Fraction) -> int:

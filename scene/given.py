@@ -18,17 +18,6 @@ MAX_HARMONICS = 16  # validity is decided by exact algebra, whose cost grows ste
 MAX_KNOTS = 256
 
 
-def finite(field: str, number: object) -> float:
-    """Return a finite number as a float.
-
-    Raises:
-        InvalidScene: it is not a finite number.
-    """
-    if type(number) is float and -math.inf < number < math.inf:
-        return number
-    return check_number(field, number, InvalidScene)
-
-
 def finite_times(t: object) -> NDArray[np.float64]:
     """Return times as an array.
 
@@ -55,7 +44,7 @@ def amplitudes(field: str, numbers: object) -> tuple[float, ...]:
         raise InvalidScene(f"{field} = {shown(numbers)}, must be a list of numbers")
     if len(numbers) > MAX_HARMONICS:
         raise InvalidScene(f"{field} has {len(numbers)} harmonics, at most {MAX_HARMONICS} are allowed")
-    return tuple(finite(f"{field}[{k}]", number) for k, number in enumerate(numbers))
+    return tuple(check_number(f"{field}[{k}]", number, InvalidScene) for k, number in enumerate(numbers))
 
 
 def checked_knot(i: int, knot: object) -> tuple[float, float]:
@@ -68,8 +57,6 @@ def checked_knot(i: int, knot: object) -> tuple[float, float]:
     if not (isinstance(knot, tuple | list) and len(knot) == 2):
         raise InvalidScene(f"bang-bang.knots[{i}] = {shown(knot)}, must be a pair [time, value]")
     time, value = knot
-    if type(time) is type(value) is float and abs(time) < math.inf and abs(value) < math.inf:
-        return time, value
     return (
         check_number(f"bang-bang.knots[{i}] time", time, InvalidScene),
         check_number(f"bang-bang.knots[{i}] value", value, InvalidScene),

@@ -21,8 +21,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from scene.given import MAX_KNOTS, amplitudes, check_legs, checked_knot, finite, finite_times
-from scene.refusal import InvalidScene, listed, shown
+from scene.given import MAX_KNOTS, amplitudes, check_legs, checked_knot, finite_times
+from scene.refusal import InvalidScene, check_number, listed, shown
 
 LEAST_NORMAL = 2.0**-1022
 
@@ -54,13 +54,13 @@ class Fourier(
         Raises:
             InvalidScene: naming the field, the value and the bound.
         """
-        _keep(self, "mean", finite("fourier.mean", self.mean))
+        _keep(self, "mean", check_number("fourier.mean", self.mean, InvalidScene))
         for field in ("cos", "sin"):
             _keep(self, field, amplitudes(f"fourier.{field}", getattr(self, field)))
         if (self.omega is None) == (self.period is None):
             raise InvalidScene("fourier needs exactly one of `omega` and `period`")
         field = "omega" if self.period is None else "period"
-        size = finite(f"fourier.{field}", getattr(self, field))
+        size = check_number(f"fourier.{field}", getattr(self, field), InvalidScene)
         if size <= 0:
             raise InvalidScene(f"fourier.{field} = {size}, must be finite and > 0")
         _keep(self, field, size)
@@ -179,44 +179,38 @@ def piece_at(law: Law, time: Fraction) -> Piece:
         A float (constant for ever), the Fourier law itself, or the Quadratic up to its end.
     """
     if isinstance(law, BangBang):
-        return law.knots[0][1] if is_constant(law) else _leg_at(law.knots, time)
+        return law.knots[0][1] if is_constant(law) else leg_at(law, time)
     if isinstance(law, Fourier):
         return law.mean if is_constant(law) else law
     return law
 
 
 @lru_cache(maxsize=64)
-def _exact_times(knots: tuple[tuple[float, float], ...]) -> list[Fraction]:
-    return [Fraction(t) for t, _ in knots]
+def half_legs(law: BangBang) -> tuple[Quadratic, ...]:
+    """Return the parabolas of the period that begins at the first knot, also of a law at rest."""
+    found = []
+    for knot, next_knot in itertools.pairwise(law.knots):
+        (start, before), (stop, after) = map(Fraction, knot), map(Fraction, next_knot)
+        half_acceleration = 2 * (after - before) / (stop - start) ** 2
+        found.append(Quadratic(start, before, Fraction(0), half_acceleration, (start + stop) / 2))
+        found.append(Quadratic(stop, after, Fraction(0), -half_acceleration, stop))
+    return tuple(found)
 
 
-def _leg_at(knots: tuple[tuple[float, float], ...], time: Fraction) -> Quadratic:
-    times = _exact_times(knots)
-    period = times[-1] - times[0]
-    n_periods = 0 if times[0] <= time < times[-1] else (time - times[0]) // period
-    early, late = _halves(knots, bisect_right(times, time - n_periods * period) - 1, n_periods)
-    return early if time < early.end else late
-
-
-@lru_cache(maxsize=256)
-def _halves(knots: tuple[tuple[float, float], ...], i: int, n_periods: int) -> tuple[Quadratic, Quadratic]:
-    times = _exact_times(knots)
-    shift = n_periods * (times[-1] - times[0])
-    start, stop = times[i] + shift, times[i + 1] + shift
-    before, after = Fraction(knots[i][1]), Fraction(knots[i + 1][1])
-    half_acceleration = 2 * (after - before) / (stop - start) ** 2
-    middle = (start + stop) / 2
-    early = Quadratic(start, before, Fraction(0), half_acceleration, middle)
-    return early, Quadratic(stop, after, Fraction(0), -half_acceleration, stop)
+def leg_at(law: BangBang, time: Fraction) -> Quadratic:
+    """Return the half leg that holds at `time` and just after it."""
+    legs = half_legs(law)
+    start = legs[0].origin
+    shift = (time - start) // (legs[-1].end - start) * (legs[-1].end - start)
+    leg = legs[bisect_right(legs, time - shift, key=lambda leg: leg.end)]
+    return leg._replace(origin=leg.origin + shift, end=leg.end + shift)
 
 
 def breakpoints(law: Law) -> list[Fraction]:
     """Return the times in one period, ends included, at which the law is not analytic."""
     if not isinstance(law, BangBang):
         return []
-    times = [Fraction(knot[0]) for knot in law.knots]
-    middles = [(a + b) / 2 for a, b in itertools.pairwise(times)]
-    return sorted(times + middles)
+    return [half_legs(law)[0].origin, *(leg.end for leg in half_legs(law))]
 
 
 def exact(ctx: Any, number: Fraction) -> Any:
@@ -325,7 +319,7 @@ def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
     is_late = phases - knots[legs] >= knots[legs + 1] - phases  # the middle of a leg need not be a float
     found = np.empty(times.shape)
     for leg in np.unique(legs):
-        for piece, half in zip(_halves(law.knots, int(leg), 0), (~is_late, is_late), strict=True):
+        for piece, half in zip(half_legs(law)[2 * leg : 2 * leg + 2], (~is_late, is_late), strict=True):
             those = (legs == leg) & half
             found[those] = evaluate(_Arrays, piece, phases[those], order)
     return found

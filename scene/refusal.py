@@ -65,6 +65,8 @@ def check_number(field: str, value: object, refusal: type[BadInput] = BadInput) 
     Raises:
         BadInput: or the error given as `refusal`, naming field, value and bound.
     """
+    if type(value) is float and math.isfinite(value):
+        return value
     given = listed(value)
     if isinstance(given, bool) or not isinstance(given, numbers.Real):
         raise refusal(f"{field} = {shown(given)}, must be a finite number")

@@ -27,9 +27,8 @@ from typing import Any, ClassVar, Literal
 import msgspec
 from mpmath import fp
 
-from scene.given import finite
 from scene.laws import BangBang, Fourier, Law, Period, at, shared_period
-from scene.refusal import BadInput, InvalidScene, listed, shown
+from scene.refusal import BadInput, InvalidScene, check_number, listed, shown
 from scene.validity import Condition, prove
 
 Wall = Literal["arc", "base", "left", "right", "floor"]
@@ -64,7 +63,7 @@ class _Table(
                 continue
             if isinstance(given, bool) or not isinstance(given, Real):
                 raise InvalidScene(f"{field} = {shown(given)}, must be a number, a Fourier or a BangBang law")
-            msgspec.structs.force_setattr(self, field, finite(field, given))
+            msgspec.structs.force_setattr(self, field, check_number(field, given, InvalidScene))
         for field in ("name", "notes"):
             _check_text(field, getattr(self, field))
         _prove(type(self), tuple(getattr(self, name, None) for name in PARAMETERS))
@@ -168,7 +167,7 @@ def _prove(table: type[_Table], given: tuple[Law | None, ...]) -> None:
     found = {name: law for name, law in zip(PARAMETERS, given, strict=True) if law is not None}
     for name, law in found.items():
         if isinstance(law, float):
-            finite(name, law)
+            check_number(name, law, InvalidScene)
     if table is Mushroom and (("w" in found) == ("nu" in found)):
         raise InvalidScene("a mushroom needs exactly one of `w` and `nu`")
     prove(found, _conditions(found))

@@ -10,16 +10,15 @@ condition, `scene.mixed` decides it. Then the two sides must not touch: contact 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from math import inf, isfinite, prod
 from typing import Any, NamedTuple
 
-from mpmath import fp
+import numpy as np
 
 from scene import exact, mixed
 from scene.exact import half_angle, leg_intervals, leg_polynomial, one_plus_square
-from scene.given import MAX_HARMONICS
 from scene.laws import (
     BangBang,
     Law,
@@ -29,12 +28,11 @@ from scene.laws import (
     period_of,
     shared_period,
     value,
+    values,
 )
 from scene.laws import exact as number
 from scene.precision import decimals
 from scene.refusal import InvalidScene
-
-ALIKE = 2.0**-40  # how near a ratio of two periods, as given, is to one of small numbers
 
 Laws = Mapping[str, Law]
 
@@ -94,25 +92,10 @@ def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
         )
     if isinstance(laws[first], BangBang) and isinstance(laws[second], BangBang):
         return "repeat the knots of the shorter, or let it rest until the longer ends"
-    found = _multiples(a, b)
-    common = "a period that holds a whole number of each"
-    if found is not None:
-        shared = decimals().nstr(found[0] * a.value(decimals()), 6)
-        common = (
-            f"the period {shared}, {found[0]} times that of {first} and {found[1]} times that of {second}"
-        )
-    return f"let both have {common}, and put waves further back in cos and sin (or repeat the knots)"
-
-
-def _multiples(a: Period, b: Period) -> tuple[int, int] | None:
-    """Return equally long multiples of two given periods; None if they need too many harmonics."""
-    ctx = decimals()
-    ratio = a.value(ctx) / b.value(ctx)
-    if not 1 <= MAX_HARMONICS * ratio <= MAX_HARMONICS**2:  # far beyond, it is no float either
-        return None
-    near = Fraction(float(ratio)).limit_denominator(MAX_HARMONICS)
-    is_near = near.numerator <= MAX_HARMONICS and abs(float(ratio) - near) <= ALIKE * near
-    return (near.denominator, near.numerator) if is_near else None
+    return (
+        "let both have a period that holds a whole number of each,"
+        " and put waves further back in cos and sin (or repeat the knots)"
+    )
 
 
 def _is_clear(condition: Condition) -> bool:
@@ -180,37 +163,35 @@ def _on_circle(condition: Condition) -> Iterator[tuple[exact.Polynomial, Fractio
         yield total, -bound, bound
 
 
-def _least(times: list[Any], roughly: Callable[[Any], float], condition: Condition) -> list[Any]:
-    """Return the times at which a condition's excess may be smallest; all times, if floats do not tell."""
+def _least(condition: Condition, start: float, span: float, n: int) -> Sequence[int]:
+    """Return after which n-ths of a period a condition's excess may be least; all, if floats do not tell."""
     # Floats know t, and hence the phase of a wave, to some 2^-52 of it: here to 2^-30 of a turn.
-    span = abs(times[-1] - times[0])
-    if not max(map(abs, times)) < 2.0**18 * span:
-        return times
-    try:
-        found = [roughly(t) for t in times]
-        sizes = (prod(max(map(abs, bounds(law)[:2])) for law in factors) for _, factors in condition.terms)
-        near = min(found) + 2.0**-20 * sum(sizes)
-    except (ArithmeticError, ValueError):  # floats do not reach as far
-        return times
-    return [t for t, level in zip(times, found, strict=True) if level <= near] if near < inf else times
+    if not abs(start) + span < 2.0**18 * span:
+        return range(n)
+    times = start + span * np.arange(n) / n
+    sizes = (prod(max(map(abs, bounds(law)[:2])) for law in factors) for _, factors in condition.terms)
+    with np.errstate(all="ignore"):
+        found = sum(sign * prod(values(law, times) for law in factors) for sign, factors in condition.terms)
+        near = np.min(found) + 2.0**-20 * sum(sizes)
+    return np.flatnonzero(found <= near).tolist() if near < inf else range(n)
 
 
 def _message(laws: Laws, condition: Condition, known: Fraction | None = None) -> str:
     # The proof is done; this only looks for an instant to show in the message. In mp no scene overflows.
     ctx = decimals()
     shared = shared_period(laws.values())
-    span = shared.value(ctx) if shared else ctx.mpf(0)
+    span, n = (shared.value(ctx), 512) if shared else (ctx.mpf(0), 1)
     start = next((law.knots[0][0] for law in laws.values() if isinstance(law, BangBang)), 0.0)
-    times = [ctx.mpf(start) + span * i / 512 for i in range(512 if span else 1)]
+    times = [ctx.mpf(start) + span * i / n for i in _least(condition, start, float(span), n)]
     if known is not None:
         times.append(number(ctx, known))
 
-    def excess(t: Any, ctx: Any = ctx) -> Any:
+    def excess(t: Any) -> Any:
         return sum(sign * prod(value(ctx, f, t) for f in factors) for sign, factors in condition.terms)
 
     def shown(x: Any) -> str:
         return str(ctx.nstr(x, 6))
 
-    worst = min(_least(times, lambda t: excess(float(t), fp), condition), key=excess)
-    values = ", ".join(f"{name} = {shown(value(ctx, law, worst))}" for name, law in laws.items())
-    return f"{condition.text} fails by {shown(excess(worst))} near t = {shown(worst)}, where {values}"
+    worst = min(times, key=excess)
+    places = ", ".join(f"{name} = {shown(value(ctx, law, worst))}" for name, law in laws.items())
+    return f"{condition.text} fails by {shown(excess(worst))} near t = {shown(worst)}, where {places}"

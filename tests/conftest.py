@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import fcntl
 import gc
+import json
 import os
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
@@ -163,6 +164,11 @@ class Ended(NamedTuple):
     code: object
     out: str
     err: str
+
+    def data(self) -> Any:
+        """Return the JSON that a command printed, which must have done what it was asked for."""
+        assert self.code == 0, self.err
+        return json.loads(self.out)
 
 
 @pytest.fixture

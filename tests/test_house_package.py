@@ -36,16 +36,12 @@ def test_every_package_says_that_it_is_typed():
 def test_the_published_readme_has_no_relative_link():
     readme = (ROOT / "README.md").read_text("utf-8")
     published = published_readme(readme)
-    links = re.findall(r"\]\(([^)]+)\)", published)
+    raw = REPOSITORY.replace("https://github.com/", "https://raw.githubusercontent.com/") + "/main/"
+    links, found = (re.findall(r"\]\(([^)]+)\)", text) for text in (readme, published))
     assert len(links) > 20
-    owner = REPOSITORY.removeprefix("https://github.com/")
-    raw = f"https://raw.githubusercontent.com/{owner}/main/"
-    for address, given in zip(links, re.findall(r"\]\(([^)]+)\)", readme), strict=True):
-        if given.startswith("https://"):
-            assert address == given
-            continue
-        start = raw if given.endswith(".svg") else f"{REPOSITORY}/blob/main/"
-        assert address == start + given
+    for link, address in zip(links, found, strict=True):
+        start = raw if link.endswith(".svg") else f"{REPOSITORY}/blob/main/"
+        assert address == (link if link.startswith("https://") else start + link)
     assert published_readme(published) == published
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pyarrow
 import pytest
+import zarr
+from pyarrow import parquet
 from support import practice_engine
-from support.refusals import assert_refused
 
 import scene as scenes
 import theory
@@ -30,6 +32,10 @@ CAUSES = {
     "starts on the wall": "starts are not uniform in area",
     "misprinted protocol": "the loop encloses nothing",
     "half a period": "many captures end together at 0.500 of the cycle",
+    "energies exchanged": "E0 and E1 are exchanged",
+    "logarithms to base 10": "base 10",
+    "gains of speeds": "speeds are given",
+    "gains less 1": "E1/E0 - 1 is given",
     "slope 1/9": "",  # moves m1 by 7e-6, which 1e11 particles would show
 }
 
@@ -46,11 +52,7 @@ def right():
     return practice_engine.ensemble(N, 41)
 
 
-def test_every_mistake_has_its_cause():
-    assert set(CAUSES) == set(practice_engine.ENSEMBLES)
-
-
-@pytest.mark.parametrize("name", CAUSES)
+@pytest.mark.parametrize("name", practice_engine.ENSEMBLES)
 def test_a_mistake_is_refuted_and_its_cause_is_named(name, tmp_path, right):
     switches, write_down = practice_engine.ENSEMBLES[name]
     n = 400 if "has_wrong_sign" in switches else N
@@ -59,16 +61,6 @@ def test_a_mistake_is_refuted_and_its_cause_is_named(name, tmp_path, right):
     assert result.verdict == ("refuted" if CAUSES[name] else "confirmed"), result.checks
     assert CAUSES[name] in " ".join(result.causes)
     assert bool(result.causes) == bool(CAUSES[name])
-
-
-def test_other_mistakes_of_the_pen_are_named(tmp_path, right):
-    gain = np.log(right["E1"] / right["E0"])
-    said = {"E0 and E1 are exchanged": -gain, "base 10": gain / np.log(10), "speeds are given": gain / 2}
-    said |= {"E1/E0 - 1 is given": np.expm1(gain)}
-    for words, s in said.items():
-        result = audit_ensemble.examine(write(tmp_path / "s.csv", {"s": s}), SCENE, None, PLAIN)
-        assert result.verdict == "refuted"
-        assert words in " ".join(result.causes)
 
 
 def test_missing_particles_are_told_from_wrong_physics(tmp_path, right):
@@ -88,23 +80,16 @@ def test_a_seeded_sample_of_theory_passes_in_other_units_and_forms(tmp_path, rig
     assert given.energy == practice_engine.ENERGY
     assert "times are taken as parts of a cycle, inferred" in notes
     assert np.nanmax(np.abs(given.t_in - here.t_in)) < 1e-12
-    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
-    parquet.write_table(arrow.table(right), tmp_path / "e.parquet")
-    zarr = pytest.importorskip("zarr")
+    parquet.write_table(pyarrow.table(right), tmp_path / "e.parquet")
     group = zarr.open_group(tmp_path / "e.zarr", mode="w")
     for name, column in right.items():
         group.create_array(name, data=column)
-    for form in ("e.parquet", "e.zarr"):
+    cells = [["" if np.isnan(x) else float(x).hex() for x in column] for column in right.values()]
+    (tmp_path / "hex.csv").write_text("\n".join(map(",".join, [list(right), *zip(*cells, strict=True)])))
+    for form in ("e.parquet", "e.zarr", "hex.csv"):
         same, _ = audit_ensemble.read(tmp_path / form, SCENE, PLAIN)
         assert np.array_equal(same.s, here.s)
         assert np.array_equal(same.t_out, here.t_out, equal_nan=True)
-    text = (tmp_path / "f.csv").read_text().splitlines()
-    rows = [
-        ",".join(float(cell).hex() if cell != "nan" else "" for cell in row.split(",")) for row in text[1:]
-    ]
-    (tmp_path / "hex.csv").write_text("\n".join([text[0], *rows]))
-    same, _ = audit_ensemble.read(tmp_path / "hex.csv", SCENE, PLAIN)
-    assert np.array_equal(same.s, here.s)
 
 
 def test_further_cycles_are_held_to_sums(tmp_path):
@@ -143,83 +128,13 @@ def test_a_scene_without_rates_leaves_open_what_it_cannot_tell():
 def test_the_command_writes_a_page(tmp_path, right, command_line):
     path = write(tmp_path / "e.csv", right)
     out = tmp_path / "report"
-    code, printed, err = command_line("audit", "--ensemble", path, "--scene", "moving-cap", "--out", out)
+    audit = ["audit", "--scene", "moving-cap", "--out", out, "--ensemble"]
+    code, printed, err = command_line(*audit, path)
     assert (code, err) == (0, "")
     assert "holds  m1" in printed
     assert json.loads((out / "report.json").read_text())["verdict"] == "confirmed"
     page = (out / "report.html").read_text()
     assert page.count("<img") == 2
     assert "confirmed" in page
-
-
-def table(header="E0,E1", *rows):
-    return "\n".join([header, *(rows or ["1e4,2e4", "1e4,3e4"])])
-
-
-BAD = {
-    "missing file": (None, [], "No such file"),
-    "other ending": ("e.txt", [], "must be a .csv or .parquet file"),
-    "empty": ("", [], "column 'E1' is missing"),
-    "header only": ("E0,E1\n", [], "0 energies, must be 2 or more"),
-    "one row": (table("E0,E1", "1e4,2e4"), [], "1 energies, must be 2 or more"),
-    "no E1": (table("E0,x"), [], "column 'E1' is missing, as is 's'; it has E0, x"),
-    "E1 twice": (table("E1,E1"), [], "column 'E1' stands twice"),
-    "no E0": (table("N,E1"), [], "column 'E0' is missing, and so is --energy"),
-    "text": (table("E0,E1", "1e4,2e4", "1e4,north"), [], "e.csv':3: E1 = 'north', must be a finite number"),
-    "infinite": (table("E0,E1", "1e4,2e4", "1e4,1e999"), [], "0 energies")
-    and ("E0,E1\n1e4,0x1p\n", [], "E1 = '0x1p'"),
-    "short row": (table("E0,E1,t_in", "1e4,2e4,1", "1e4,x"), [], "2 cells, must be 3"),
-    "negative E0": (table("E0,E1", "-1,2", "-1,3"), [], "E0 = -1.0, must be finite and > 0"),
-    "nan E0": (table("E0,E1", "nan,2", "nan,3"), [], "E0 = nan, must be finite and > 0"),
-    "two energies": (
-        table("E0,E1", "1e4,2e4", "1e5,2e5"),
-        [],
-        "E0 takes several values, 10000 and 100000 among them",
-    ),
-    "many energies": (
-        table("E0,E1", *(f"{k},1" for k in range(1, 40))),
-        [],
-        "E0 takes several values, 1 and 2 among them",
-    ),
-    "no such energy": (table(), ["--energy", "7"], "0 energies, must be 2 or more"),
-    "energy 0": (table(), ["--energy", "0"], "'--energy': 0.0, must be finite and > 0"),
-    "odd flag": (table("E0,E1,captured", "1e4,2e4,2", "1e4,2e4,0"), [], "captured = 2.0, must be 0 or 1"),
-    "late times": (
-        table("E0,E1,t_in", "1e4,2e4,99", "1e4,3e4,98"),
-        [],
-        "t_in = 98 to 99, must be in the cycle",
-    ),
-    "unknown unit": (table(), ["--energy-unit", "eV"], "--energy-unit = 'eV', must be one of v2/2, v2"),
-    "unknown time": (table(), ["--time-unit", "s"], "--time-unit = 's', must be one of scene, cycles"),
-    "few particles": (table(), ["--particles", "1"], "--particles = 1, must be at least the 2 rows"),
-    "unknown scene": (table(), ["--scene", "nowhere"], "nowhere"),
-    "static scene": (table(), ["--scene", "frozen-mushroom"], "must be a mushroom that moves"),
-    "no mushroom": (table(), ["--scene", "breathing-circle"], "must be a mushroom that moves"),
-    "too slow": (table("E0,E1", "1,2", "1,3"), [], None),
-    "--full": (table(), ["--full"], "--full"),
-    "--only": (table(), ["--only", "X2"], "--only"),
-    "no parquet": ("e.parquet", [], "Parquet"),
-    "no zarr": ("e.zarr", [], "is no Zarr group"),
-}
-
-
-@pytest.mark.parametrize("name", BAD)
-def test_a_bad_file_is_refused_in_one_line(name, tmp_path, command_line):
-    content, options, message = BAD[name]
-    is_name = content in ("e.txt", "e.parquet", "e.zarr")
-    path = tmp_path / (content if is_name else "e.csv")
-    if content is not None:
-        path.write_text("x" if is_name else content)
-    scene = [] if "--scene" in options else ["--scene", "moving-cap"]
-    out = tmp_path / "report"
-    result = command_line("audit", "--ensemble", path, *scene, *options, "--out", out)
-    if message is None:
-        assert result.code in (0, 1)
-    else:
-        assert_refused(result, message)
-        assert not (out / "report.json").exists()
-
-
-def test_options_of_an_ensemble_need_one(command_line, tmp_path):
-    assert_refused(command_line("audit", "--scene", "moving-cap", "--out", tmp_path / "r"), "no --ensemble")
-    assert_refused(command_line("audit", "--ensemble", "e.csv", "--out", tmp_path / "r"), "needs --scene")
+    path.write_text("E0,E1\n1,2\n1,3\n")  # two particles, too slow for any theory
+    assert command_line(*audit, path).code in (0, 1)

@@ -36,11 +36,11 @@ from scene import load
 
 pytestmark = pytest.mark.usefixtures("unsynced")
 N, ENERGY, SEED = 330, 40.0, 7
-RUN = ["simulate", "fermi-ulam", "--energy", ENERGY, "--seed", SEED, "--threads", 1, "--json"]
 
 
-def arguments(folder, *more, n=N, block=64):
-    return [*RUN, "--particles", n, "--out", folder, *(["--block", block] if block else []), *more]
+def arguments(folder, *more, n=N, block=64, name="fermi-ulam"):
+    run = ["simulate", name, "--energy", ENERGY, "--seed", SEED, "--threads", 1, "--json"]
+    return [*run, "--particles", n, "--out", folder, *(["--block", block] if block else []), *more]
 
 
 @pytest.fixture(scope="module")
@@ -55,8 +55,24 @@ def run_at_once(name, n, energy=ENERGY, n_cycles=1):
 
 
 def digest_of(ended):
-    assert ended.code == 0, ended.err
-    return json.loads(ended.out)["sha256"]
+    return ended.data()["sha256"]
+
+
+@pytest.fixture
+def break_off(monkeypatch):
+    """Return what lets a run fail, with an error, after it has kept so many further blocks."""
+    keep, left = StoredRun.keep, []
+
+    def interrupted(self, block_range, block):
+        if left and left.pop():
+            raise left.pop()
+        keep(self, block_range, block)
+
+    def after(n_kept, error=KeyboardInterrupt):
+        left[:] = [error, True, *[False] * n_kept]
+
+    monkeypatch.setattr(StoredRun, "keep", interrupted)
+    return after
 
 
 @pytest.mark.parametrize(
@@ -85,18 +101,9 @@ def test_blocks_of_any_size_have_one_digest(tmp_path, name, energy, n_cycles):
 
 
 def test_a_run_goes_on_and_is_widened_from_its_last_full_block(
-    command_line, tmp_path, followed, whole, monkeypatch
+    command_line, tmp_path, followed, whole, break_off
 ):
-    keep, n_kept = StoredRun.keep, 0
-
-    def interrupted(self, block_range, block):
-        nonlocal n_kept
-        keep(self, block_range, block)
-        n_kept += 1
-        if n_kept == 2:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(StoredRun, "keep", interrupted)
+    break_off(2)
     code, out, err = command_line(*arguments(tmp_path))
     assert (code, out) == (130, "")
     assert f"interrupted; 128 of {N} particles are kept; go on with: mushrooms simulate fermi-ulam" in err
@@ -134,22 +141,36 @@ def emptied(_content):
         (emptied, "ensemble.zarr/outcome/c/2"),
         (truncated, "blocks/2.marker"),
         (flipped, "blocks/2.marker"),
+        (truncated, "ensemble.zarr/t/zarr.json"),
+        (truncated, "ensemble.zarr/zarr.json"),
+        (truncated, f"blocks/{DESCRIPTION}"),
     ],
 )
-def test_a_damaged_file_is_found_and_its_block_followed_again(
+def test_a_damaged_file_is_mended_and_its_block_followed_again(
     command_line, tmp_path, followed, whole, damage, name
 ):
+    """Of one array's description nothing is followed again; that of the run is there twice."""
     digest_of(command_line(*arguments(tmp_path)))
-    path = tmp_path / name
-    path.write_bytes(damage(path.read_bytes()))
-    code, _, err = command_line("export", tmp_path, "--to", tmp_path / "run.npz")
-    assert (code, err.count("\n")) == (2, 1)
-    assert not (tmp_path / "run.npz").exists()
+    path, is_block = tmp_path / name, "2" in name
+    content = path.read_bytes()
+    path.write_bytes(damage(content))
+    if is_block:
+        assert_refused(command_line("export", tmp_path, "--to", tmp_path / "run.npz"), "mushrooms simulate")
+        assert not (tmp_path / "run.npz").exists()
     followed.clear()
     again = command_line(*arguments(tmp_path, "--resume"))
     assert digest_of(again) == whole[N]
-    assert "1 blocks (2)" in again.err
-    assert followed == [(0, conduct.PROBED, 0, 1), (128, 64, 0, 1)]
+    assert ("1 blocks (2)" in again.err) == is_block
+    assert followed == [(0, conduct.PROBED, 0, 1), *[(128, 64, 0, 1)] * is_block]
+    assert is_block or len(path.read_bytes()) == len(content)
+
+
+def test_a_run_whose_descriptions_are_both_damaged_is_refused(command_line, tmp_path):
+    digest_of(command_line(*arguments(tmp_path)))
+    for path in (tmp_path / "ensemble.zarr" / "zarr.json", tmp_path / "blocks" / DESCRIPTION):
+        path.write_bytes(truncated(path.read_bytes()))
+    for command in (arguments(tmp_path, "--resume"), ["draw", tmp_path, "--out", tmp_path / "a.svg"]):
+        assert_refused(command_line(*command), "description is damaged")
 
 
 def test_the_digest_does_not_take_a_chunk_that_changes_at_the_last_moment(
@@ -225,24 +246,6 @@ def test_another_run_in_the_folder_is_refused(command_line, tmp_path, change, op
     assert held(tmp_path) == before
 
 
-def test_a_description_is_there_twice_and_refused_when_both_are_damaged(
-    command_line, tmp_path, followed, whole
-):
-    digest_of(command_line(*arguments(tmp_path)))
-    paths = [tmp_path / "ensemble.zarr" / "zarr.json", tmp_path / "blocks" / DESCRIPTION]
-    for path in [*paths, tmp_path / "ensemble.zarr" / "t" / "zarr.json"]:
-        content = path.read_bytes()
-        path.write_bytes(truncated(content))
-        followed.clear()
-        assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
-        assert followed == [(0, conduct.PROBED, 0, 1)]
-        assert len(path.read_bytes()) == len(content)
-    for path in paths:
-        path.write_bytes(truncated(path.read_bytes()))
-    assert_refused(command_line(*arguments(tmp_path, "--resume")), "description is damaged")
-    assert_refused(command_line("draw", tmp_path, "--out", tmp_path / "a.svg"), "description is damaged")
-
-
 def test_blocks_of_another_run_do_not_count(command_line, tmp_path, followed, whole):
     """Files that somebody moved here: each is as it was written, but of another seed."""
     digest_of(command_line(*arguments(tmp_path / "other", "--seed", 8)))
@@ -295,31 +298,20 @@ def test_the_time_of_day_decides_nothing(command_line, tmp_path, monkeypatch, wh
     assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
 
 
-def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, tmp_path, monkeypatch):
+def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, tmp_path, break_off):
     """Runs that are broken off, harmed, widened and lengthened at random."""
-    random, keep = np.random.default_rng(11), StoredRun.keep
-    left = 0
-
-    def sometimes(self, block_range, block):
-        nonlocal left
-        left -= 1
-        if left < 0:
-            raise [KeyboardInterrupt, OSError(errno.EIO, "input/output error")][random.integers(2)]
-        keep(self, block_range, block)
-
-    monkeypatch.setattr(StoredRun, "keep", sometimes)
+    random, errors = np.random.default_rng(11), (KeyboardInterrupt, OSError(errno.EIO, "input/output error"))
     for number in range(int(os.environ.get("MUSHROOMS_HARMS", "4"))):
         folder, n, cycles, block = tmp_path / str(number), 20, 1, int(random.integers(5, 40))
         for _ in range(6):
-            n, left = n + int(random.integers(0, 40)), int(random.integers(0, 8))
-            cycles += int(random.integers(0, 2))
-            more = ["--resume", "--cycles", cycles]
-            assert command_line(*arguments(folder, *more, n=n, block=block)).code in (0, 2, 130)
+            n, cycles = n + int(random.integers(0, 40)), cycles + int(random.integers(0, 2))
+            run = arguments(folder, "--resume", "--cycles", cycles, n=n, block=block)
+            break_off(int(random.integers(0, 8)), errors[random.integers(2)])
+            assert command_line(*run).code in (0, 2, 130)
             if folder.exists():
                 harmed(folder, random)
-        left = 10**6
-        ended = command_line(*arguments(folder, *more, n=n, block=block))
-        assert digest_of(ended) == run_at_once("fermi-ulam", n, n_cycles=cycles)
+        break_off(10**4)
+        assert digest_of(command_line(*run)) == run_at_once("fermi-ulam", n, n_cycles=cycles)
 
 
 def faulty_sums(_array):
@@ -362,10 +354,8 @@ def test_faulty_stores_are_found_out(command_line, tmp_path, monkeypatch, whole,
 N_LONG, BLOCK = 150, 32
 
 
-def lengthened(folder, cycles, *more, n=N_LONG, block=BLOCK, name="fermi-ulam"):
-    words = ["simulate", name, "--particles", n, "--energy", ENERGY, "--seed", SEED, "--cycles", cycles]
-    sizes = ["--block", block] if block else []
-    return [*words, "--threads", 1, "--json", "--out", folder, "--resume", *sizes, *more]
+def lengthened(folder, cycles, n=N_LONG, block=BLOCK, name="fermi-ulam"):
+    return arguments(folder, "--cycles", cycles, "--resume", n=n, block=block, name=name)
 
 
 def cycles_at_once(n_cycles, n=N_LONG, name="fermi-ulam"):
@@ -373,8 +363,7 @@ def cycles_at_once(n_cycles, n=N_LONG, name="fermi-ulam"):
 
 
 def summary_of(ended):
-    assert ended.code == 0, ended.err
-    return {name: value for name, value in json.loads(ended.out).items() if name != "ns_per_collision"}
+    return {name: value for name, value in ended.data().items() if name != "ns_per_collision"}
 
 
 @pytest.fixture(autouse=True)
@@ -422,22 +411,11 @@ def test_a_run_that_is_long_enough_is_not_followed_again(command_line, tmp_path,
     assert (saved["cycles"], saved["particles"]) == (3, 170)
 
 
-def test_a_lengthening_that_is_broken_off_goes_on(command_line, tmp_path, followed, monkeypatch):
+def test_a_lengthening_that_is_broken_off_goes_on(command_line, tmp_path, followed, break_off):
     """Also to more cycles than it was broken off at; blocks of three lengths stand side by side."""
-    keep, left = StoredRun.keep, 0
-
-    def interrupted(self, block_range, block):
-        nonlocal left
-        left -= 1
-        if left < 0:
-            raise KeyboardInterrupt
-        keep(self, block_range, block)
-
-    monkeypatch.setattr(StoredRun, "keep", interrupted)
-    left = 10
     summary_of(command_line(*lengthened(tmp_path, 1)))
     for cycles, n_kept in ((2, 3), (4, 0), (4, 1)):
-        left = n_kept
+        break_off(n_kept)
         code, out, err = command_line(*lengthened(tmp_path, cycles))
         assert (code, out) == (130, "")
         told = f"{32 * n_kept} of {N_LONG} particles are" if n_kept else "what was there is"
@@ -447,7 +425,6 @@ def test_a_lengthening_that_is_broken_off_goes_on(command_line, tmp_path, follow
         command_line("export", tmp_path, "--to", tmp_path / "a.csv"), f"has 32 of {N_LONG} particles"
     )
     assert_refused(command_line(*lengthened(tmp_path, 3)), "cycles = 4 there, 3 asked for: a run only grows")
-    left = 10
     followed.clear()
     assert summary_of(command_line(*lengthened(tmp_path, 4)))["sha256"] == cycles_at_once(4).sha256()
     assert followed[:3] == [(32, 4, 0, 2), (32, 4, 2, 4), (32, 4, 0, 4)]  # they can be lengthened
@@ -460,34 +437,28 @@ def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
 ):
     """The process dies after some of the block's chunks, or before its marker."""
     summary_of(command_line(*lengthened(tmp_path, 1)))
-    put, left = LocalStore.set, n_written
+    put, write, left = LocalStore.set, stored.write_file, n_written
 
     async def dying(self, key, value):
         nonlocal left
-        if "zarr.json" not in key:
-            left -= 1
-            if left < 0:
-                raise OSError(errno.EIO, os.strerror(errno.EIO))
+        left -= "zarr.json" not in key
+        if left < 0:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
         await put(self, key, value)
 
-    def no_marker(_path, _content):
-        raise OSError(errno.EIO, os.strerror(errno.EIO))
+    def unmarked(path, content):
+        if path.name == "0.marker":
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        write(path, content)
 
-    keep = StoredRun.keep
-
-    def dies(self, block_range, block):
-        monkeypatch.setattr(stored, "write_file", no_marker)
-        keep(self, block_range, block)
-
-    monkeypatch.setattr(StoredRun, "keep", dies)
-    if n_written < 100:
-        monkeypatch.setattr(LocalStore, "set", dying)
-    assert command_line(*lengthened(tmp_path, 3)).code == 2
-    monkeypatch.undo()
+    with monkeypatch.context() as patch:
+        patch.setattr(LocalStore, "set", dying)
+        patch.setattr(stored, "write_file", unmarked)
+        assert command_line(*lengthened(tmp_path, 3)).code == 2
     ended = command_line(*lengthened(tmp_path, 3))
-    assert json.loads(ended.out)["sha256"] == cycles_at_once(3).sha256()
-    # Its first new chunk holds later cycles alone, and those before do not miss it.
-    assert ("1 blocks (0)" in ended.err) == (n_written > 2)
+    assert digest_of(ended) == cycles_at_once(3).sha256()
+    # Its first chunks hold the cycles there were, with the same bits, or later ones alone.
+    assert ("1 blocks (0)" in ended.err) == (n_written > 3)
 
 
 def test_a_chunk_holds_the_cycles_that_a_run_began_with(command_line, tmp_path):

@@ -10,7 +10,7 @@ from fractions import Fraction
 
 import mpmath
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 from support.tables import BOX, CIRCLE, STATIC
@@ -18,7 +18,6 @@ from support.truth import IS_DEEP
 
 import fast
 import reference
-from conformance.strategies import scenes_and_states
 from reference.rational import law_jet
 from scene import (
     BadInput,
@@ -31,7 +30,6 @@ from scene import (
     State,
     Stem,
     Undecided,
-    Undefined,
     load,
 )
 
@@ -85,20 +83,6 @@ def test_bad_states_are_rejected(stepper, scene, state, words):
     assert "\n" not in outcome.reason
 
 
-@settings(max_examples=10_000 if IS_DEEP else 60)
-@given(scenes_and_states())
-def test_precisions_nest(drawn):
-    """15 and 60 digits enclose the same truth."""
-    scene, state, t_end = drawn
-    one = reference.next_collision(scene, state, t_end, digits=15)
-    two = reference.next_collision(scene, state, t_end, digits=60)
-    assert type(one) is type(two)
-    if isinstance(one, reference.Collision):
-        assert one.wall == two.wall
-        for a, b in zip((one.dt, *one.after), (two.dt, *two.after), strict=True):
-            assert max(a.lo, b.lo) <= min(a.hi, b.hi)
-
-
 def test_trajectory_encloses_its_last_state():
     path = reference.trajectory(load("moving-cap"), State(0.0, 0.1, 0.3, 10.0, 7.0), 60, digits=30)
     finer = reference.trajectory(load("moving-cap"), State(0.0, 0.1, 0.3, 10.0, 7.0), 60, digits=50)
@@ -122,13 +106,6 @@ def test_a_path_through_the_middle_of_the_base_has_its_digits_there():
         assert 0 < last.after.x.width() < 1e-25 * last.dt.hi * 8
 
 
-def test_trajectory_ends_at_its_horizon_and_at_corners():
-    path = reference.trajectory(load("moving-cap"), State(0.0, 0.1, 0.3, 10.0, 7.0), 99, t_end=0.5)
-    assert isinstance(path.outcome, reference.Horizon)
-    path = reference.trajectory(CIRCLE, State(0, 0.5, 0.5, 0.5, -0.5), 3)
-    assert path.outcome == Undefined("corner")
-
-
 def test_threads_at_different_digits_do_not_disturb_each_other():
     def flight_time(digits):
         return hit(load("moving-cap"), State(0.0, 0.1, 0.3, 10.0, 7.0), digits=digits).dt
@@ -149,11 +126,6 @@ def test_digits_are_what_was_asked_for(digits):
 def test_the_bound_on_work_leaves_room_for_ten_thousand_digits():
     found = reference.next_collision(load("moving-cap"), State(0.0, 0.1, 0.2, 0.3, -0.4), 50.0, digits=10_000)
     assert isinstance(found, reference.Collision)
-
-
-def test_a_table_whose_square_overflows():
-    state = State(0.0, 0.6e200, 0.8e200, -1.0, -1.0, "arc")
-    assert reference.next_collision(Cap(r=1e200), state, 1e300).wall == "base"
 
 
 def test_few_digits_refuse_no_start_on_its_wall():
@@ -286,12 +258,6 @@ def test_margins_near_the_corner_of_arc_and_base(near):
     found = margins_of(CIRCLE, State(0, 0.5, 0.5, 0.5, -0.5 - near))
     assert float(found.corner) == pytest.approx(near, rel=0.02)
     assert 0 < float(found.gap) < 5 * near
-
-
-def test_margins_at_the_arc_of_the_moving_cap_before_the_base():
-    found = margins_of(load("moving-cap"), State(0.1, 0.9, 0.2, 3.0, -0.5))
-    assert found.gap is not None
-    assert 0 < float(found.corner) < 0.2
 
 
 FACTORS = st.lists(st.integers(-2, 2), min_size=1, max_size=6).map(tuple)

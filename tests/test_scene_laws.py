@@ -43,13 +43,6 @@ def test_a_fourier_law_is_its_sum():
     assert value(fp, law, t) == pytest.approx(expected, rel=1e-15)
 
 
-def test_frequency_of_a_period_is_the_nearest_number():
-    ctx = context(50)
-    law = Fourier(1.0, period=3.0, cos=(0.5,))
-    assert abs(frequency(ctx, law) * 3 - 2 * ctx.pi) < ctx.mpf(10) ** -48
-    assert float(frequency(ctx, Fourier(1.0, 0.1, (0.5,)))) == 0.1
-
-
 @pytest.mark.parametrize(("time", "level"), [(0.0, 1.0), (0.25, 0.3), (0.5, 0.3), (0.75, 1.0), (1.0, 1.0)])
 def test_bang_bang_rests_at_its_knots(time, level):
     ctx = context(40)
@@ -142,23 +135,6 @@ def test_derivatives_are_limits_of_differences(law, t):
             1 + 64 * (float(frequency(fp, law)) if isinstance(law, Fourier) else 0.0)
         )
         assert abs(slope - value(ctx, law, time, order + 1)) <= size * step
-
-
-@given(moving, times)
-def test_a_piece_agrees_with_the_law_until_its_end(law, t):
-    piece = piece_at(law, Fraction(t))
-    if not isinstance(piece, Quadratic):
-        assert piece == law
-        return
-    ctx = context(60)
-    after = piece_at(law, piece.end)
-    assert piece.end > Fraction(t)
-    end = exact(ctx, piece.end)
-    tiny = ctx.mpf(2) ** -150
-    for order in (0, 1):
-        assert abs(evaluate(ctx, piece, end, order) - evaluate(ctx, after, end, order)) < tiny
-    inside = (Fraction(t) + piece.end) / 2
-    assert piece_at(law, inside) == piece
 
 
 @given(laws(), st.floats(-8.0, 8.0), st.floats(0.0, 2.0**-6))

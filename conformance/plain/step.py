@@ -175,6 +175,7 @@ class Flight:
     def __init__(self, scene: Scene, state: State, t_end: float) -> None:
         self.scene, self.state, self.t_end = scene, state, t_end
         self.x, self.y, self.vx, self.vy, self.wall = state.x, state.y, state.vx, state.vy, state.wall
+        self.known: dict[tuple[Wall, float], Gap] = {}
         if self.wall is None and self.y == 0 and not isinstance(scene, Mushroom):
             self.wall = "base"
         self.laws = {name: self.law(law) for name, law in laws(scene).items()}
@@ -306,6 +307,12 @@ class Flight:
         return value, gap.ft + gap.fx * self.vx + gap.fy * self.vy
 
     def gap(self, wall: Wall, s: float) -> Gap:
+        """Return a wall's function at a time, evaluated once: the search comes back to most times."""
+        if (wall, s) not in self.known:
+            self.known[wall, s] = self.evaluate(wall, s)
+        return self.known[wall, s]
+
+    def evaluate(self, wall: Wall, s: float) -> Gap:
         """Evaluate a wall's function; each rise is free of cancellation for small s."""
         if wall == "arc":
             r, xy, v2 = self.laws["r"].at(s), self.x * self.vx + self.y * self.vy, self.vx**2 + self.vy**2

@@ -193,6 +193,9 @@ class Process:
         self._stdin, self._stdout, self._stderr = stdin, stdout, stderr_pipe
         for stream in (stdin, stdout, stderr_pipe):
             os.set_blocking(stream.fileno(), False)
+        self._selector = selectors.DefaultSelector()
+        for stream in (stdout, stderr_pipe):
+            self._selector.register(stream, selectors.EVENT_READ)
         self._transcript = stderr
         self._received = bytearray()
         self._is_open = True  # its standard output
@@ -261,6 +264,7 @@ class Process:
         if self._child.returncode is None:
             self._descendants.kill()
             self._child.wait()
+        self._selector.close()
         for stream in (self._stdin, self._stdout, self._stderr):
             with contextlib.suppress(OSError):
                 stream.close()
@@ -271,24 +275,23 @@ class Process:
 
     def _advance(self, pending: bytes, timeout: float) -> bytes:
         # One look at all pipes; returns what is still to be written.
-        with selectors.DefaultSelector() as selector:
-            if self._is_open:
-                selector.register(self._stdout, selectors.EVENT_READ)
-            if not self._stderr.closed:
-                selector.register(self._stderr, selectors.EVENT_READ)
-            if pending:
-                selector.register(self._stdin, selectors.EVENT_WRITE)
-            for key, _ in selector.select(timeout):
-                if key.fileobj is self._stdin:
-                    pending = self._write(pending)
-                elif key.fileobj is self._stdout:
-                    data = self._stdout.read(2**20)
-                    self._received += data or b""
-                    self._is_open = data != b""
-                elif data := self._stderr.read(2**20):
-                    self._transcript.add(data)
-                else:
-                    self._stderr.close()
+        is_pending = bool(pending)
+        if is_pending:
+            self._selector.register(self._stdin, selectors.EVENT_WRITE)
+        for key, _ in self._selector.select(timeout):
+            if key.fileobj is self._stdin:
+                pending = self._write(pending)
+                continue
+            data = key.fileobj.read(2**20)  # type: ignore[union-attr]
+            if data == b"":
+                self._selector.unregister(key.fileobj)
+            if key.fileobj is self._stdout:
+                self._received += data or b""
+                self._is_open = data != b""
+            elif data:
+                self._transcript.add(data)
+        if is_pending:
+            self._selector.unregister(self._stdin)
         return pending
 
     def _write(self, pending: bytes) -> bytes:

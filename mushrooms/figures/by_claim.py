@@ -139,7 +139,7 @@ def gain_of_capture() -> Figure:
     return figure
 
 
-def energies(samples: list[Sample]) -> Figure:
+def energies(*samples: Sample) -> Figure:
     """Draw histograms of log E1/E0 with theory over them, and below what is left, in standard errors."""
     figure, pairs = panels(len(samples))
     for (panel, rest), sample in zip(pairs, samples, strict=True):
@@ -158,7 +158,7 @@ def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
     draw_adiabatic(axes, energies_of(sample.run.name), bars.edges, "sharp")
 
 
-def capture_times(samples: list[Sample]) -> Figure:
+def capture_times(*samples: Sample) -> Figure:
     """Draw histograms of capture times with the theory's density over them."""
     figure, axes = new_figure(9.6, 3.2, 1, len(samples))
     for panel, sample in zip(np.atleast_1d(axes), samples, strict=True):
@@ -173,12 +173,12 @@ def capture_times(samples: list[Sample]) -> Figure:
     return figure
 
 
-def sums(cases: list[tuple[Sample, int]]) -> Figure:
-    """Draw log E_n/E0 over n: density, and its tails on a logarithmic axis."""
-    figure, axes = new_figure(9.6, 3.2 * len(cases), len(cases), 2)
-    for row, (sample, n) in zip(np.reshape(axes, (-1, 2)), cases, strict=True):
+def sums(*samples: Sample) -> Figure:
+    """Draw log E_n/E0 over n of the last run there is: density, and its tails on a logarithmic axis."""
+    figure, axes = new_figure(9.6, 6.4, 2, 2)
+    for row, n in zip(axes, (10, 30), strict=True):
         for panel, scale in zip(row, ("linear", "log"), strict=True):
-            _sum(panel, sample, n, scale)
+            _sum(panel, samples[-1], n, scale)
         row[0].legend(loc="upper left")
     return figure
 
@@ -193,9 +193,14 @@ def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
     axes.plot(x, norm.pdf(x, centre, sd), color=ORANGE, linestyle="--", linewidth=1.2, label="Gaussian")
     top = float(norm.pdf(0) / sd)
     limits = (0, 1.4 * top) if scale == "linear" else (top * 1e-5, 2 * top)
-    axes.set(yscale=scale, xlim=(centre - 5 * sd, centre + 5 * sd), ylim=limits)
-    axes.set(xlabel=f"(1/{n}) ln(E_{n}/E0)", ylabel="density")
-    axes.set_title(f"n = {n}, E0 = {power(sample.run.energy)}, {sample.n:,} particles")
+    axes.set(
+        yscale=scale,
+        xlim=(centre - 5 * sd, centre + 5 * sd),
+        ylim=limits,
+        xlabel=f"(1/{n}) ln(E_{n}/E0)",
+        ylabel="density",
+        title=f"n = {n}, E0 = {power(sample.run.energy)}, {sample.n:,} particles",
+    )
 
 
 def losses(sample: Sample) -> Figure:
@@ -212,8 +217,8 @@ def losses(sample: Sample) -> Figure:
     slope = far[-1] * np.exp(rate * (n_cycles - late))
     axes.plot(late, slope, ":", color=ORANGE, label=f"exp(-{rate:.4f} n)")
     _points(axes, places, [share(sample.s[:, k - 1] < 0) for k in places])
-    axes.set(yscale="log", xlabel="cycles n", ylabel="P(E_n < E0)")
-    axes.set_title(f"{sample.run.name}, {sample.n:,} particles")
+    title = f"{sample.run.name}, {sample.n:,} particles"
+    axes.set(yscale="log", xlabel="cycles n", ylabel="P(E_n < E0)", title=title)
     axes.legend(fontsize=8)
     return figure
 
@@ -240,7 +245,7 @@ N_HITS = 250
 SEED = 7
 
 
-def zone(samples: list[Sample]) -> Figure:
+def zone(*samples: Sample) -> Figure:
     """Draw mean log E of the uncaptured and the share in the chaotic zone through the cycle."""
     figure, axes = new_figure(9.6, 3.0 * len(samples), len(samples), 2)
     for (left, right), sample in zip(np.reshape(axes, (-1, 2)), samples, strict=True):
@@ -261,12 +266,13 @@ def zone(samples: list[Sample]) -> Figure:
     return figure
 
 
-def widths(moving: list[Sample], ergodic: list[Sample]) -> Figure:
-    """Draw the width of the uncaptured peak against E0, with fitted powers."""
+def widths(*samples: Sample) -> Figure:
+    """Draw the width of the uncaptured peak against E0, with fitted powers: moving caps, then c = 0."""
     figure, axes = new_figure(5.4, 3.8)
-    for samples, colour, marker, label in ((moving, BLUE, "o", "moving cap"), (ergodic, GREEN, "s", "c = 0")):
-        energies, values = [sample.run.energy for sample in samples], [width(sample) for sample in samples]
-        fit = fitted(samples, values)
+    moving, ergodic = list(samples[: len(PEAKS)]), list(samples[len(PEAKS) :])
+    for these, colour, marker, label in ((moving, BLUE, "o", "moving cap"), (ergodic, GREEN, "s", "c = 0")):
+        energies, values = [sample.run.energy for sample in these], [width(sample) for sample in these]
+        fit = fitted(these, values)
         text = f"{label}: exponent {fit.exponent:.4f} ± {fit.exponent_error:.4f}"
         _points(axes, energies, values, fmt=marker, color=colour, markersize=5, label=text)
         axes.plot(energies, fit.coefficient * np.array(energies) ** fit.exponent, color=colour, linewidth=1)
@@ -278,7 +284,7 @@ def widths(moving: list[Sample], ergodic: list[Sample]) -> Figure:
     return figure
 
 
-def convergence(samples: list[Sample]) -> Figure:
+def convergence(*samples: Sample) -> Figure:
     """Draw the mean of s, p_nc and the unbiased mean against E0."""
     figure, axes = new_figure(9.6, 3.2, 1, 3)
     energies = [sample.run.energy for sample in samples]
@@ -301,7 +307,7 @@ def convergence(samples: list[Sample]) -> Figure:
     return figure
 
 
-def release(samples: list[Sample]) -> Figure:
+def release(*samples: Sample) -> Figure:
     """Draw nu(t_out) - nu(t_in) against 1/v."""
     figure, axes = new_figure(9.6, 3.4, 1, 2)
     for sample in samples:
@@ -336,6 +342,7 @@ def frozen() -> Figure:
 
 Samples = Mapping[str, Sample]
 MAIN_RUN, MANY_CYCLES, MANY_SLOWER = "moving-cap@1e7", "moving-cap@1e7x30", "moving-cap@1e5x30"
+PEAKS = LADDER[3:6]  # the moving caps whose widths are fitted
 
 
 class Picture(NamedTuple):
@@ -344,23 +351,16 @@ class Picture(NamedTuple):
     Attributes:
         claim: the claims's id below which it stands.
         caption: what it shows.
-        draw: makes it from the samples by run.
+        draw: makes it from the samples of its runs.
         needs: runs it cannot do without.
+        more: runs that it shows where they are there, after the others.
     """
 
     claim: str
     caption: str
-    draw: Callable[[Samples], Figure]
+    draw: Callable[..., Figure]
     needs: tuple[str, ...] = ()
-
-
-def _sums(samples: Samples) -> Figure:
-    run = MANY_CYCLES if MANY_CYCLES in samples else MANY_SLOWER
-    return sums([(samples[run], 10), (samples[run], 30)])
-
-
-def _there(samples: Samples, *names: str) -> list[Sample]:
-    return [samples[name] for name in names if name in samples]
+    more: tuple[str, ...] = ()
 
 
 ALL = (
@@ -369,61 +369,63 @@ ALL = (
         "The cycles, with the direction of time; colours mark the phase. Left: the plane of eq. "
         "(cycle). Middle and right: the plane of sec. 3.5, in which energy grows when the loop bounds"
         " an area (M12). The moving cap's runs clockwise, as its caption in the paper says.",
-        lambda _: loops(),
+        loops,
     ),
     Picture(
         "N5",
         "Theory: what a particle captured at t_in has gained after the cycle.",
-        lambda _: gain_of_capture(),
+        gain_of_capture,
     ),
     Picture(
         "M7",
         "Width of the uncaptured peak against energy, with fitted powers, and the power as printed. "
         "Error bars are smaller than the marks.",
-        lambda s: widths(_there(s, *LADDER[3:6]), _there(s, *ERGODIC[1:])),
-        (*LADDER[3:6], *ERGODIC[1:]),
+        widths,
+        (*PEAKS, *ERGODIC[1:]),
     ),
     Picture(
         "M9",
         "How the moving cap's means approach the theory as E0 grows. The mean of exp(-s/2), right, "
         "has no bias of order E0^(-1/2).",
-        lambda s: convergence(_there(s, *LADDER)),
+        convergence,
         LADDER[:6],
+        LADDER[6:],
     ),
     Picture(
         "X1",
         "Energies after one cycle, fixed cap. In theory (orange) the never captured share one energy,"
         " dashed; black: the theory at this energy, with diffusion and lags from frozen tables and nothing "
         "fitted.",
-        lambda s: energies(_there(s, ACW, CW)),
+        energies,
         (ACW, CW),
     ),
     Picture(
         "X2",
         "Energies after one cycle, moving cap; as above. The orange density is infinite at its right "
         "end, the caustic of N5.",
-        lambda s: energies(_there(s, "moving-cap@1e6", MAIN_RUN)),
+        energies,
         ("moving-cap@1e6", MAIN_RUN),
     ),
     Picture(
         "X3",
         "When particles are captured. The area is the captured share.",
-        lambda s: capture_times(_there(s, MAIN_RUN, ACW, CW)),
+        capture_times,
         (MAIN_RUN, ACW, CW),
     ),
     Picture(
         "X4",
         "Many cycles: the centre and, on a logarithmic axis, the tails, with sums drawn from the theory at "
         "this energy.",
-        _sums,
+        sums,
         (MANY_SLOWER,),
+        (MANY_CYCLES,),
     ),
-    Picture("X5", "c = 0: one narrow peak.", lambda s: energies([s["ergodic@1e7"]]), ("ergodic@1e7",)),
+    Picture("X5", "c = 0: one narrow peak.", energies, ("ergodic@1e7",)),
     Picture(
         "X6",
         "Tilted and upright stem: energies of the never captured, each counted from its own theory's "
         "log E_nc. Parabolic orbits between the upright sides spread them far.",
-        lambda s: stems(s["moving-cap@1e6"], s["untilted@1e6"]),
+        stems,
         ("moving-cap@1e6", "untilted@1e6"),
     ),
     Picture(
@@ -431,32 +433,32 @@ ALL = (
         "A loop without an interior that accelerates. Left: one parameter moves along the arc and back; "
         "captures (blue) and their releases (orange), at the same V_ell/V_cap, lie at different V_cap/V. "
         "Right: energies after one cycle, as in X1.",
-        lambda s: retraced(s["retraced-arc@1e6"]),
+        retraced,
         ("retraced-arc@1e6",),
     ),
     Picture(
         "D1",
         "How rare it is to end with less energy: the probability falls as exp(-n I).",
-        lambda s: losses(s[MANY_SLOWER]),
+        losses,
         (MANY_SLOWER,),
     ),
     Picture(
         "L3",
         "The frozen mushroom: orbits in the island (blue) and in the chaotic zone (orange).",
-        lambda _: frozen(),
+        frozen,
     ),
     Picture(
         "L4",
         "Release: how far nu at release is from nu at capture, against 1/v (grey: single particles), "
         "and its distribution in units of 1/v.",
-        lambda s: release(_there(s, *LADDER[1:6])),
+        release,
         LADDER[1:6],
     ),
     Picture(
         "L5",
         "Through the cycle: mean log E of the particles not captured so far, and the share of "
         "particles in the chaotic zone (L6).",
-        lambda s: zone(_there(s, MAIN_RUN, ACW)),
+        zone,
         (MAIN_RUN, ACW),
     ),
 )
@@ -467,6 +469,7 @@ def drawn(claims: list[str], samples: Samples) -> list[tuple[Picture, Figure]]:
     found = []
     for picture in ALL:
         if picture.claim in claims and all(name in samples for name in picture.needs):
+            runs = [samples[name] for name in (*picture.needs, *picture.more) if name in samples]
             with rc_context(STYLE):
-                found.append((picture, picture.draw(samples)))
+                found.append((picture, picture.draw(*runs)))
     return found

@@ -144,8 +144,12 @@ def draw_section(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None
         _draw_zones(axes, *span)
     place, sine = (np.concatenate([one[k] for one in sections]) for k in (2, 3))
     _points(axes, found, place, sine, np.concatenate([one.is_captured() for one in sections]), "hits")
-    axes.set(xlim=(0, 1), ylim=(-1, 1), xlabel="angle of the place on the arc / π, from the right end")
-    axes.set_ylabel("sin φ; φ: from the arc's normal, clockwise > 0")
+    axes.set(
+        xlim=(0, 1),
+        ylim=(-1, 1),
+        xlabel="angle of the place on the arc / π, from the right end",
+        ylabel="sin φ; φ: from the arc's normal, clockwise > 0",
+    )
 
 
 def _draw_zones(axes: Axes, low: float, high: float) -> None:
@@ -169,8 +173,8 @@ def _draw_stem(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None) 
         return
     has_floor = isinstance(found[0].scene, Stem) and not is_constant(found[0].scene.h)
     wall, name = ("floor", "vy") if has_floor else ("side", "|vx|")
-    axes.set(xlim=(0, 1), ylim=(0, None), xlabel=f"phase t/T of the hit of a moving {wall}")
-    axes.set_ylabel(f"{name} after the hit [length/time]")
+    label = f"{name} after the hit [length/time]"
+    axes.set(xlim=(0, 1), ylim=(0, None), xlabel=f"phase t/T of the hit of a moving {wall}", ylabel=label)
 
 
 def _points(
@@ -206,8 +210,12 @@ def draw_map(axes: Axes, found: Sequence[FollowedOrbit]) -> None:
         if slot.end - slot.begin > 0:
             where = ((slot.begin + slot.end) / 2, 1.03)
             axes.text(*where, slot.wall, ha="center", va="bottom", fontsize=9, transform=axes.transData)
-    axes.set(xlim=(0, 1), ylim=(-1, 1), xlabel="place along the boundary, anticlockwise")
-    axes.set_ylabel("sine of the angle to the wall's normal, anticlockwise > 0")
+    axes.set(
+        xlim=(0, 1),
+        ylim=(-1, 1),
+        xlabel="place along the boundary, anticlockwise",
+        ylabel="sine of the angle to the wall's normal, anticlockwise > 0",
+    )
     axes.set_title(_title(found), pad=18)  # above the names of the walls
 
 

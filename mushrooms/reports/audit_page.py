@@ -215,7 +215,7 @@ def _first_figure(samples: by_claim.Samples) -> str:
     if by_claim.MAIN_RUN not in samples:
         return ""
     with rc_context(plots.STYLE):
-        return embed(plots.svg(by_claim.energies([samples[by_claim.MAIN_RUN]])))
+        return embed(plots.svg(by_claim.energies(samples[by_claim.MAIN_RUN])))
 
 
 def _place(finding: Data) -> tuple[list[int], str, int]:

@@ -95,12 +95,10 @@ def _errors(run: Run) -> bytes:
     figure, axes = plots.new_figure(7.2, 0.9 + 0.24 * len(groups))
     for row, group in enumerate(groups):
         ulps = np.maximum([u for u in run.ulps(group) if math.isfinite(u)], EXACT)
-        axes.plot(ulps, np.full(len(ulps), row), linestyle="none", marker="o", markersize=3.5, alpha=0.5)
+        axes.plot(ulps, np.full(len(ulps), row), "o", color=plots.BLUE, markersize=3.5, alpha=0.5)
     _mark_classes(axes, axes.axvline)
     axes.set(xscale="log", xlabel="backward ulps of the answers that passed", ylim=(len(groups) - 0.5, -0.5))
     axes.set_yticks(range(len(groups)), groups)
-    for lines in axes.lines[: len(groups)]:
-        lines.set_color(plots.BLUE)
     return plots.svg(figure)
 
 
@@ -115,8 +113,13 @@ def _speed(run: Run) -> bytes:
     axes.plot(run.speed.best_ns, worst, marker="v", color=plots.BLUE, linestyle="none", label="worst")
     axes.plot(run.speed.best_ns, middle, marker="o", color=plots.BLUE, linestyle="none", label="median")
     _mark_classes(axes, axes.axhline)
-    axes.set(xscale="log", yscale="log", xlim=(run.speed.best_ns / 30, run.speed.best_ns * 30))
-    axes.set(xlabel=f"ns per collision on {run.speed.scene}", ylabel="backward ulps")
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlim=(run.speed.best_ns / 30, run.speed.best_ns * 30),
+        xlabel=f"ns per collision on {run.speed.scene}",
+        ylabel="backward ulps",
+    )
     axes.legend(frameon=False)
     return plots.svg(figure)
 

@@ -13,7 +13,6 @@ import math
 import shutil
 import sys
 import time
-from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import closing
@@ -34,7 +33,7 @@ from scene import BadInput
 OnProgress = Callable[[int], None]
 Following = Generator[tuple[BlockRange, Block], None, None]
 Engine = Callable[[RunSpec, Iterator[BlockRange], OnProgress], Following]
-RETRIES = 10  # of a block whose workers fail or die
+RETRIES = 10  # of a block whose worker fails; Dask itself gives it to others when workers die
 BLOCKS_AHEAD = 2  # waiting for each thread of the cluster: no worker idles, and few blocks are in memory
 CONNECT_TIMEOUT = 10.0  # seconds in which a scheduler must answer
 POLL_INTERVAL = 0.5  # seconds after which limits are looked at while no block comes
@@ -67,14 +66,12 @@ def follow(
     return Block(columns(paused), ensemble.seconds * ensemble.threads)
 
 
-def in_process(threads: int | None) -> Engine:
-    """Return the engine that follows one block after another with all threads."""
-
-    def engine(spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress) -> Following:
-        for block_range in block_ranges:
-            yield block_range, follow(spec, block_range, threads, on_progress)
-
-    return engine
+def in_process(
+    spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress, threads: int | None
+) -> Following:
+    """Follow one block after another with all threads."""
+    for block_range in block_ranges:
+        yield block_range, follow(spec, block_range, threads, on_progress)
 
 
 def follow_elsewhere(version: str, spec: RunSpec, block_range: BlockRange, threads: int) -> Block:
@@ -88,69 +85,72 @@ def follow_elsewhere(version: str, spec: RunSpec, block_range: BlockRange, threa
     return follow(spec, block_range, threads)
 
 
-def by_dask(address: str, threads: int | None) -> Engine:
-    """Return the engine that hands blocks to the workers of a Dask scheduler.
+def by_dask(
+    spec: RunSpec,
+    block_ranges: Iterator[BlockRange],
+    on_progress: OnProgress,
+    address: str,
+    threads: int | None,
+) -> Following:
+    """Hand blocks to the workers of a Dask scheduler.
 
     Args:
+        spec: the run.
+        block_ranges: to be followed.
+        on_progress: see `OnProgress`.
         address: of the scheduler, as tcp://host:8786.
         threads: for each block; 1 by default, as a worker has as many blocks at a time as it has threads.
 
     Raises:
         BadInput: dask.distributed is not installed, or no scheduler answers.
-        ConnectionError: the engine; the cluster is lost.
+        ConnectionError: the cluster is lost.
     """
     try:
-        from distributed import Client
+        from distributed import Client, KilledWorker
         from distributed.comm import CommClosedError, resolve_address
     except ImportError:
         raise BadInput("--dask needs dask.distributed: pip install 'oscillating-mushrooms[scale]'") from None
-
-    def engine(spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress) -> Following:
-        try:
-            resolve_address(address)  # of what is no address the client is made, and cannot be closed
-            # Not the process's default: what else computes with Dask here would wait for this one, even
-            # after it has failed to connect.
-            client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
-        # Dask logs pages of its own when a cluster is lost, which are of no use to go on with the run.
-        log = logging.getLogger("distributed.client")
-        level = log.level
-        log.setLevel(logging.CRITICAL + 1)
-        try:
-            with client:
-                yield from _hand_out(client, spec, block_ranges, on_progress, threads or 1)
-        except (CancelledError, CommClosedError) as error:
-            why = type(error).__name__
-            raise ConnectionError(f"--dask = {address}: the scheduler has gone ({why})") from None
-        except RuntimeError as error:
-            if "deserialization" not in str(error):
-                raise
-            raise ConnectionError(f"--dask = {address}: the scheduler must have this project too") from None
-        finally:
-            log.setLevel(level)
-
-    return engine
+    try:
+        resolve_address(address)  # of what is no address the client is made, and cannot be closed
+        # Not the process's default: what else computes with Dask here would wait for this one, even
+        # after it has failed to connect.
+        client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
+    # Dask logs pages of its own when a cluster is lost, which are of no use to go on with the run.
+    log = logging.getLogger("distributed.client")
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        with client:
+            yield from _hand_out(client, spec, block_ranges, on_progress, threads or 1)
+    except (CancelledError, CommClosedError) as error:
+        why = type(error).__name__
+        raise ConnectionError(f"--dask = {address}: the scheduler has gone ({why})") from None
+    except KilledWorker:
+        raise ConnectionError(f"--dask = {address}: workers die of a block again and again") from None
+    except RuntimeError as error:
+        if "deserialization" not in str(error):
+            raise
+        raise ConnectionError(f"--dask = {address}: the scheduler must have this project too") from None
+    finally:
+        log.setLevel(level)
 
 
 def _hand_out(
     client: Any, spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress, threads: int
 ) -> Following:
     """Keep every worker busy, and yield what comes back; what is still out is dropped at the end."""
-    from distributed import KilledWorker, wait
+    from distributed import wait
 
-    out, n_killed = dict[Any, BlockRange](), Counter[int]()
-
-    def submit(block_range: BlockRange) -> None:
-        asked_for = (mushrooms.__version__, spec, block_range, threads)
-        options = {"pure": False, "retries": RETRIES, "priority": -block_range.number}
-        out[client.submit(follow_elsewhere, *asked_for, **options)] = block_range
-
+    out = dict[Any, BlockRange]()
     try:
         while True:
             n_wanted = max(1, BLOCKS_AHEAD * sum(client.nthreads().values())) - len(out)
             for block_range in islice(block_ranges, max(0, n_wanted)):
-                submit(block_range)
+                asked_for = (mushrooms.__version__, spec, block_range, threads)
+                options = {"pure": False, "retries": RETRIES, "priority": -block_range.number}
+                out[client.submit(follow_elsewhere, *asked_for, **options)] = block_range
             if not out:
                 return
             on_progress(0)
@@ -160,19 +160,7 @@ def _hand_out(
             except TimeoutError:
                 continue
             for future in done:
-                block_range = out.pop(future)
-                try:
-                    block = future.result()
-                except KilledWorker:
-                    # So many workers died with it that the scheduler gave it up; it may not be its fault.
-                    n_killed[block_range.number] += 1
-                    if n_killed[block_range.number] > RETRIES:
-                        raise ConnectionError(
-                            f"--dask: workers die of block {block_range.number} again and again"
-                        ) from None
-                    submit(block_range)
-                    continue
-                yield block_range, block
+                yield out.pop(future), future.result()
     finally:
         client.cancel(list(out))
 
@@ -248,10 +236,9 @@ def open_or_create(
     shape = shape_of(spec, n_particles, found["block"], found["cycles_of_a_chunk"])
     run = StoredRun(folder, spec, shape, command)
     damaged = run.check()
-    if is_there:
-        _probe(run)
     _check_disk(run)
     if is_there:
+        _probe(run)
         run.describe()
         if damaged:
             few = ", ".join(map(str, damaged[:5])) + (" ..." if len(damaged) > 5 else "")
@@ -317,7 +304,7 @@ def complete(
     with closing(engine(run.spec, block_ranges, report)) as found, ThreadPoolExecutor(1) as writer:
         under_way: Future[None] | None = None
         for block_range, block in found:
-            most = block.tally.most
+            most = int(block.arrays["wall_counts"].sum(axis=1).max())
             if max_collisions is not None and most > max_collisions:
                 made = f"a particle of block {block_range.number} makes {most} collisions"
                 raise LimitReached(f"{made}, --max-collisions = {max_collisions}")

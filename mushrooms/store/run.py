@@ -190,23 +190,12 @@ class StoredRun:
         """
         if not self._arrays:
             self.describe()
-        first_cycle = 0
-        if block_range.before is not None:
-            first_cycle = self._markers[
-                block_range.number
-            ].cycles  # those before are on disk, and stay as they are
-        rows = slice(block_range.first, block_range.first + block_range.n)
+        number, first, n, _ = block_range
         for name in self.shape.names:
-            values = block.arrays[name]
-            if "cycle" in FIELDS[name].dims:
-                self._arrays[name][rows, first_cycle:] = values[:, first_cycle:]
-            else:
-                self._arrays[name][rows] = values
+            self._arrays[name][first : first + n] = block.arrays[name]
         sums = {name: _sum(block.arrays[name]) for name in self.shape.names}
-        marker = Marker(
-            self._identity, block_range.number, block_range.n, self.shape.n_cycles, sums, block.seconds
-        )
-        write_file(self._path(block_range.number), sealed(json.dumps(marker._asdict()).encode()))
+        marker = Marker(self._identity, number, n, self.shape.n_cycles, sums, block.seconds)
+        write_file(self._path(number), sealed(json.dumps(marker._asdict()).encode()))
         self._count(marker, block.tally)
 
     def describe(self) -> None:

@@ -26,7 +26,6 @@ class RunTally(NamedTuple):
         particles, followed, undecided: how many started, reached the end, could not be decided.
         collisions, careful: in all.
         met: collisions of those that were followed to the end.
-        most: collisions of the particle that has most.
         captured: captured cycles of the particles that take part.
     """
 
@@ -36,13 +35,11 @@ class RunTally(NamedTuple):
     collisions: int = 0
     careful: int = 0
     met: int = 0
-    most: int = 0
     captured: int = 0
 
     def merged(self, other: RunTally) -> RunTally:
         """Return the tally of both."""
-        sums = RunTally(*(a + b for a, b in zip(self, other, strict=True)))
-        return sums._replace(most=max(self.most, other.most))
+        return RunTally(*(a + b for a, b in zip(self, other, strict=True)))
 
 
 def tally_of(arrays: dict[str, npt.NDArray[Any]]) -> RunTally:
@@ -56,7 +53,6 @@ def tally_of(arrays: dict[str, npt.NDArray[Any]]) -> RunTally:
         collisions=int(n_collisions.sum()),
         careful=int(arrays["n_careful"].sum()),
         met=int(n_collisions[was_followed].sum()),
-        most=int(n_collisions.max(initial=0)),
         captured=int(np.isfinite(arrays["t_in"][takes_part]).any(axis=2).sum()) if "t_in" in arrays else 0,
     )
 

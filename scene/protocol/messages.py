@@ -25,59 +25,58 @@ PROFILES = ("step", "trajectory", "flow", "time")
 Seq = Annotated[int, msgspec.Meta(ge=0, le=MAX_SEQ)]
 
 
-class StartRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="start", forbid_unknown_fields=True):
+class _Request(msgspec.Struct, frozen=True, tag_field="cmd", forbid_unknown_fields=True):
+    pass
+
+
+class _Question(_Request, frozen=True):
+    seq: Seq
+    scene: msgspec.Raw
+
+
+class StartRequest(_Request, frozen=True, tag="start"):
     """Opens a session; answered by Introduction."""
 
     protocol: int
 
 
-class EchoRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="echo", forbid_unknown_fields=True):
+class EchoRequest(_Request, frozen=True, tag="echo"):
     """Asks for the same numbers back, bit for bit; answered by Echoed."""
 
     values: tuple[float, ...]
 
 
-class StepRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="step", forbid_unknown_fields=True):
+class StepRequest(_Question, frozen=True, tag="step"):
     """Asks for one collision; answered by an outcome with the same seq."""
 
-    seq: Seq
-    scene: msgspec.Raw
     state: State
     t_end: float
 
 
-class TrajectoryRequest(
-    msgspec.Struct, frozen=True, tag_field="cmd", tag="trajectory", forbid_unknown_fields=True
-):
+class TrajectoryRequest(_Question, frozen=True, tag="trajectory"):
     """Asks for successive collisions; answered by Steps."""
 
-    seq: Seq
-    scene: msgspec.Raw
     state: State
     collisions: int
     t_end: float
 
 
-class FlowRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="flow", forbid_unknown_fields=True):
+class FlowRequest(_Question, frozen=True, tag="flow"):
     """Asks where many particles are at t_end; answered by Flown."""
 
-    seq: Seq
-    scene: msgspec.Raw
     states: tuple[State, ...]
     t_end: float
 
 
-class TimeRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="time", forbid_unknown_fields=True):
+class TimeRequest(_Question, frozen=True, tag="time"):
     """Asks how long a trajectory of that many collisions takes, `repeat` times over; answered by Timed."""
 
-    seq: Seq
-    scene: msgspec.Raw
     state: State
     collisions: int
     repeat: int
 
 
-class StopRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="stop", forbid_unknown_fields=True):
+class StopRequest(_Request, frozen=True, tag="stop"):
     """Ends the session; not answered, the process exits."""
 
 
@@ -134,17 +133,12 @@ class Steps(msgspec.Struct, frozen=True):
     steps: tuple[Answered, ...]
 
 
-class Arrival(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
+class Arrival(Horizon, frozen=True, tag="horizon"):
     """A particle at t_end, and its first capture interval [time]; None if it has none.
 
     An interval that lasts at t_end ends there.
     """
 
-    t: float
-    x: float
-    y: float
-    vx: float
-    vy: float
     captured: tuple[float, float] | None = None
 
 

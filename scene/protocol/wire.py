@@ -28,7 +28,7 @@ from scene.protocol.messages import (
     TrajectoryRequest,
     with_minus_zeros,
 )
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_count
 from scene.states import Outcome, Rejected, State
 from scene.tables import Scene
 
@@ -130,9 +130,8 @@ class _Server:
                 return _plain(self.stepper(scene, command.state, command.t_end))
             if isinstance(command, FlowRequest):
                 return self.answer_flow(scene, command)
-            _check_range(
-                "collisions", command.collisions, int(isinstance(command, TimeRequest)), MAX_COLLISIONS
-            )
+            least = int(isinstance(command, TimeRequest))
+            check_count("collisions", command.collisions, least, MAX_COLLISIONS)
             if isinstance(command, TimeRequest):
                 return self.answer_time(scene, command)
             steps = self.follower(scene, command.state, command.collisions, command.t_end)
@@ -149,14 +148,14 @@ class _Server:
     def answer_flow(self, scene: Scene, command: FlowRequest) -> dict[str, Any]:
         if self.flow is None:
             raise BadInput("flow is not among this implementation's profiles")
-        _check_range("number of states", len(command.states), 0, MAX_STATES)
+        check_count("number of states", len(command.states), 0, MAX_STATES)
         arrivals = self.flow(scene, command.states, command.t_end)
         return {"states": [{**_plain(outcome), "captured": captured} for outcome, captured in arrivals]}
 
     def answer_time(self, scene: Scene, command: TimeRequest) -> dict[str, Any]:
         if self.timer is None:
             raise BadInput("time is not among this implementation's profiles")
-        _check_range("repeat", command.repeat, 1, MAX_REPEAT)
+        check_count("repeat", command.repeat, 1, MAX_REPEAT)
         ns, last = self.timer(scene, command.state, command.collisions, command.repeat)
         return {"ns": list(ns), "steps": [_plain(last)]}
 
@@ -164,11 +163,6 @@ class _Server:
         if self.kept is None or self.kept[0] != raw:
             self.kept = raw, from_data(msgspec.json.decode(raw))
         return self.kept[1]
-
-
-def _check_range(field: str, value: int, low: int, high: int) -> None:
-    if not low <= value <= high:
-        raise BadInput(f"{field} = {value}, must be {low} to {high}")
 
 
 def _refusal(error: Exception) -> Rejected:

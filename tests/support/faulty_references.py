@@ -4,7 +4,6 @@ A family of attacks hunts it. Each is a function that makes its mistake through 
 mends it afterwards. Others, of test_reference_mutants, are killed by a battery of answers known by hand.
 """
 
-from bisect import bisect_right
 from collections.abc import Callable
 from fractions import Fraction
 from math import fmod, pi
@@ -20,7 +19,7 @@ from reference.jets import Jet, multiply
 from reference.timeline import Legs
 from reference.walls import MovingWalls
 from reference.waves import Waves
-from scene.laws import bounds
+from scene.laws import bounds, leg_at
 from scene.tables import laws
 
 Fault = Callable[[pytest.MonkeyPatch], None]
@@ -42,9 +41,7 @@ def replacing(owner: object, name: str) -> Callable[[Callable[..., Any]], Fault]
 @replacing(Legs, "jet")
 def knots_unseen(honest, self, s):
     """The piece that holds where an interval begins is taken to hold on all of it."""
-    low = self.instant + exact_ends(s)[0]
-    turn = (low - self.starts[0]) // self.period * self.period
-    return self._on(bisect_right(self.starts, low - turn) - 1, turn, s)
+    return self._on(leg_at(self.law, self.instant + exact_ends(s)[0]), s)
 
 
 @replacing(Legs, "__init__")
@@ -157,7 +154,7 @@ def few_harmonics(honest, self, arithmetic, law, instant):
 @replacing(Course, "_beyond_crossing")
 def narrow_mouth(honest, self, crossing):
     """The mouth is taken to be narrower by 1e-3 of itself."""
-    part = Jet(self.arithmetic.number(Fraction(999, 1000)), None, None)
+    part = Jet(self.arithmetic.number(Fraction(999, 1000)), self.arithmetic.zero, self.arithmetic.zero)
     self.motion.width = lambda s: multiply(MovingWalls.width(self.motion, s), part)
     return honest(self, crossing)
 

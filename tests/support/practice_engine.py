@@ -163,6 +163,11 @@ def in_place_of_logarithms(columns: dict[str, Any]) -> dict[str, Any]:
 
 
 # By name: the switches of the engine, and what is done with its columns.
+def written_as(change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    """Return what writes down log E1/E0, changed, and nothing else."""
+    return lambda columns: {"s": change(np.log(columns["E1"] / columns["E0"]))}
+
+
 ENSEMBLES: dict[str, tuple[dict[str, Any], Callable[[dict[str, Any]], dict[str, Any]]]] = {
     "right": ({}, dict),
     "leaks at the mouth's corners": ({"leak": 0.006}, dict),
@@ -174,5 +179,9 @@ ENSEMBLES: dict[str, tuple[dict[str, Any], Callable[[dict[str, Any]], dict[str, 
     "misprinted protocol": ({"misprinted": True}, dict),
     "half a period": ({"t_end": PERIOD / 2}, dict),
     "slope 1/9": ({"slope": 1 / 9}, dict),
+    "energies exchanged": ({}, written_as(np.negative)),
+    "logarithms to base 10": ({}, written_as(lambda s: s / np.log(10))),
+    "gains of speeds": ({}, written_as(lambda s: s / 2)),
+    "gains less 1": ({}, written_as(np.expm1)),
     "no stays told": ({}, lambda columns: {name: columns[name] for name in ("E0", "E1")}),
 }

@@ -154,6 +154,8 @@ def together(
         if kinds != {"horizon"}:
             continue
         n_compared += 1
+        if part == own:
+            continue
         one, other = read_outcome(part), read_outcome(own)
         assert distance(scene, one, other) <= ALONE, f"{where}: {one} among others, {other} alone"
         stays = part.get("captured"), own.get("captured")

@@ -115,6 +115,8 @@ def _first_flaw(
     f, steep, turn, away = 0.0 * t, 1.0 + 0.0 * t, 0.0 * t, 0.0 * t
     for wall in scene.walls:
         k = np.flatnonzero(walls == wall)
+        if not k.size:
+            continue
         at = table_at(fp, scene, t[k])
         f[k] = at.gap(wall, x[k], y[k])
         steep[k] = at.r if wall == "arc" else 1.0

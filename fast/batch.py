@@ -25,7 +25,7 @@ from fast.kernel.records import (  # isort: skip
     ANCHORS_SHAPE, HORIZON, Compiled, FloatArray, IntArray, Particle, Paths, particle_at, unfilled_ends,
     unfilled_paths, write_state, write_step,
 )  # fmt: skip
-from fast.kernel.scalar_step import KNOWN, MET
+from fast.kernel.scalar_step import KNOWN
 from fast.kernel.walls import wall_residual
 from fast.kernel.worker import DISK, GENERAL, careful_at, new_worker, run_careful
 from fast.paths import FineTrajectory, as_trajectory, fill_fine_path
@@ -76,39 +76,28 @@ def residual(particle, scene, anchors):
 
 
 @kept(error_model="numpy")
-def fill_careful(step_at, scene, anchors, states, walls, t_end, n_times, paths):
-    """Fill in the paths from each start by careful steps, n_times over: see `Paths`."""
-    for i in range(n_times * states.shape[0]):
-        i %= states.shape[0]
-        particle, code, n = particle_at(states, i, walls[i]), walls[i], 0
-        while n < paths.walls.shape[1]:
-            limit = (t_end - particle.t) - particle.t_low
-            origin = KNOWN if n == 0 else MET
-            code, dt, particle = run_careful(step_at, (particle, limit, origin, scene, anchors))
-            if code >= HORIZON:
-                break
-            paths.walls[i, n] = code
-            write_step(paths, i, n, dt, particle)
-            n += 1
-        paths.codes[i], paths.counts[i] = code, n
+def fill_careful(step_at, scene, anchors, states, walls, n_times, paths):
+    """Fill in a careful step from each start, n_times over: see `Paths`, of one collision."""
+    for k in range(n_times * states.shape[0]):
+        i = k % states.shape[0]
+        known = particle_at(states, i, walls[i]), np.inf, KNOWN, scene, anchors
+        paths.codes[i], dt, particle = run_careful(step_at, known)
+        if paths.codes[i] < HORIZON:
+            write_step(paths, i, 0, dt, particle)
         write_state(paths.ends, i, particle)
 
 
-def followed_paths(
-    compiled: Compiled, states: FloatArray, walls: IntArray, n_collisions: int, t_end: float, n_times: int = 1
-) -> Paths:
-    """Follow each of N states by careful steps, all in the kernel's units.
+def take_careful_steps(compiled: Compiled, states: FloatArray, walls: IntArray, n_times: int = 1) -> Paths:
+    """Take a careful step from each of N states, all in the kernel's units; see `careful_steps`.
 
     Args:
         compiled: the scene's numbers.
         states: (N, 6) t, its low part, x, y, vx, vy.
         walls: (N,) codes of the walls that they leave.
-        n_collisions: how many collisions to follow.
-        t_end: horizon [time]; infinity for none.
         n_times: how often to do all this, where its time is measured.
     """
-    paths = unfilled_paths(len(states), n_collisions)
-    fill_careful(careful_at(), compiled, np.zeros(ANCHORS_SHAPE), states, walls, t_end, n_times, paths)
+    paths = unfilled_paths(len(states), 1)
+    fill_careful(careful_at(), compiled, np.zeros(ANCHORS_SHAPE), states, walls, n_times, paths)
     return paths
 
 
@@ -126,9 +115,9 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
     starts = [fitted_start(scene, state) for state in states]
     rows, walls = as_arrays(starts)
     compiled = fit(scene).compiled
-    followed_paths(compiled, rows[:0], walls[:0], 1, np.inf)  # compiles, or loads from the cache
+    take_careful_steps(compiled, rows[:0], walls[:0])  # compiles, or loads from the cache
     begin = time.perf_counter()
-    paths = followed_paths(compiled, rows, walls, 1, np.inf, n_times)
+    paths = take_careful_steps(compiled, rows, walls, n_times)
     seconds = time.perf_counter() - begin
     outcomes: list[Outcome] = []
     for state, start, code, row in zip(states, starts, paths.codes.tolist(), paths.steps[:, 0], strict=True):

@@ -29,7 +29,7 @@ from fast.kernel.arithmetic import half_pi
 from fast.kernel.single import LARGEST, LENGTH, TIME, pack_scene, static_time
 
 from fast.kernel.records import (  # isort: skip
-    BANG_BANG, CONSTANT, FOURIER, KIND, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, BoolArray, Compiled,
+    BANG_BANG, CONSTANT, FOURIER, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, BoolArray, Compiled,
     FloatArray, IntArray,
 )  # fmt: skip
 from scene import BangBang, Cap, Fourier, InvalidState, Law, Mushroom, Scene, State
@@ -69,15 +69,13 @@ def _laid_out(scene: Scene) -> Compiled:
     if not isinstance(scene, Cap):
         h, slope, factors = scene.h, scene.slope, width_factors(scene)
     rows = [_row(law) for law in (r, factors[0], h, slope)]
-    waves = [row for row in rows if row[KIND] == FOURIER]
     moving = [law for law in (r, *factors, h, slope) if isinstance(law, Fourier) and not is_constant(law)]
-    omega_low = _omega(moving[0])[1] if moving else 0.0
     laws = np.zeros((len(rows) + 1, max(OMEGA_LOW + 1, *(len(row) for row in rows))))
     for i, row in enumerate(rows):
         laws[i, : len(row)] = row
-    for row in waves:
-        laws[SHARED, OMEGA], laws[SHARED, OMEGA_LOW] = row[OMEGA], omega_low
-        laws[SHARED, N_HARMONICS] = max(laws[SHARED, N_HARMONICS], row[N_HARMONICS])
+    for law in moving:
+        laws[SHARED, OMEGA], laws[SHARED, OMEGA_LOW] = _omega(law)
+        laws[SHARED, N_HARMONICS] = max(laws[SHARED, N_HARMONICS], len(law.cos), len(law.sin))
     limits = np.array([size_bounds(r), _product_bounds(factors), size_bounds(h), bounds(slope)])
     return Compiled(TABLES[type(scene).__name__], len(factors) == 2, laws, limits)
 

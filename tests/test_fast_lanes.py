@@ -16,7 +16,7 @@ from numba import njit, types
 from support.depth import deep_but
 
 import fast
-from fast.batch import followed_paths
+from fast.batch import take_careful_steps
 from fast.kernel import worker
 from fast.kernel.compiling import HOW, TOOLS
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
@@ -150,7 +150,7 @@ def errors_of(scene, rows, codes, answers):
     compiled = compile_scene(scene)
 
     def careful(states):
-        paths = followed_paths(compiled, states, codes[:-1], 1, np.inf)
+        paths = take_careful_steps(compiled, states, codes[:-1])
         return paths.codes, paths.steps[:, 0][:, [0, 2, 3, 4, 5]]
 
     found, truth = careful(rows)

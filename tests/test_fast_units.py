@@ -49,7 +49,7 @@ def answers(scene, state, t_end):
         words += [type(found).__name__, getattr(found, "wall", None), reason]
         if isinstance(found, Collision | Horizon):
             rows.append([getattr(found, "dt", dt), found.t, found.x, found.y, found.vx, found.vy])
-    return words, np.array(rows)
+    return words, np.reshape(rows, (-1, 6))  # of none, too
 
 
 def compare_scaled(question, length, time, tally):

@@ -122,23 +122,29 @@ def reduced(omega, omega_low, k, t_hi, t_lo):
     return n, r, tail
 
 
+def _series(first: int, last: int) -> tuple[float, ...]:
+    """Return the coefficients of the sine's or the cosine's series, from a power down to another."""
+    return tuple((-1) ** (n // 2) / math.factorial(n) for n in range(first, last - 1, -2))
+
+
+SINE_FROM_3, COSINE_FROM_4 = _series(17, 3), _series(16, 4)
+SINE_FROM_7, COSINE_FROM_6 = _series(19, 7), _series(18, 6)
+
+
+@packed
+def polynomial(z, coefficients):
+    """Return the polynomial whose coefficients are given, that of the highest power first, at least two."""
+    total = coefficients[0]
+    for coefficient in coefficients[1:]:
+        total = fma(total, z, coefficient)
+    return total
+
+
 @kernel
 def beyond_first_order(r):
     """Return sin r - r and cos r - 1 for |r| <= pi/4, by their Taylor series to r^17."""
     z = r * r
-    s = fma(1.0 / 355687428096000.0, z, -1.0 / 1307674368000.0)
-    s = fma(s, z, 1.0 / 6227020800.0)
-    s = fma(s, z, -1.0 / 39916800.0)
-    s = fma(s, z, 1.0 / 362880.0)
-    s = fma(s, z, -1.0 / 5040.0)
-    s = fma(s, z, 1.0 / 120.0)
-    s = fma(s, z, -1.0 / 6.0)
-    c = fma(1.0 / 20922789888000.0, z, -1.0 / 87178291200.0)
-    c = fma(c, z, 1.0 / 479001600.0)
-    c = fma(c, z, -1.0 / 3628800.0)
-    c = fma(c, z, 1.0 / 40320.0)
-    c = fma(c, z, -1.0 / 720.0)
-    c = fma(c, z, 1.0 / 24.0)
+    s, c = polynomial(z, SINE_FROM_3), polynomial(z, COSINE_FROM_4)
     return r * z * s, fma(z * z, c, -0.5 * z)
 
 
@@ -149,25 +155,13 @@ def short_sine_cosine(r, tail):
     The Taylor series to r^19, whose first terms are sums of two floats.
     """
     z, z_low = two_product(r, r)
-    p = fma(-1.0 / 121645100408832000.0, z, 1.0 / 355687428096000.0)
-    p = fma(p, z, -1.0 / 1307674368000.0)
-    p = fma(p, z, 1.0 / 6227020800.0)
-    p = fma(p, z, -1.0 / 39916800.0)
-    p = fma(p, z, 1.0 / 362880.0)
-    p = fma(p, z, -1.0 / 5040.0)
-    p, p_low = two_sum(1.0 / 120.0, p * z)
+    p, p_low = two_sum(1.0 / 120.0, polynomial(z, SINE_FROM_7) * z)
     p, p_low = multiplied(p, p_low + ONE_120TH_LOW, z, z_low)
     p, e = two_sum(-1.0 / 6.0, p)
     p, p_low = multiplied(p, p_low + (e - ONE_6TH_LOW), z, z_low)
     p, p_low = multiplied(p, p_low, r, 0.0)
     s, s_low = two_sum(r, p)
-    q = fma(-1.0 / 6402373705728000.0, z, 1.0 / 20922789888000.0)
-    q = fma(q, z, -1.0 / 87178291200.0)
-    q = fma(q, z, 1.0 / 479001600.0)
-    q = fma(q, z, -1.0 / 3628800.0)
-    q = fma(q, z, 1.0 / 40320.0)
-    q = fma(q, z, -1.0 / 720.0)
-    q, q_low = two_sum(1.0 / 24.0, q * z)
+    q, q_low = two_sum(1.0 / 24.0, polynomial(z, COSINE_FROM_6) * z)
     q, q_low = multiplied(q, q_low + ONE_24TH_LOW, z, z_low)
     q, e = two_sum(-0.5, q)
     q, q_low = multiplied(q, q_low + e, z, z_low)

@@ -521,9 +521,8 @@ def move(wall, s, particle, scene, anchors):
     return wall, time, Particle(t, t_low, x_s, y_s, vx, vy, wall)
 
 
-# How well a particle is known: met by the step before, with the anchors as that left them; in the table, but
-# with anchors that may be of another time; as a user gives it, perhaps off the wall that it names.
-MET, KNOWN, GIVEN = np.arange(3)
+# How well a particle is known: in the table, or as a user gives it, perhaps off the wall that it names.
+KNOWN, GIVEN = np.arange(2)
 
 
 @kernel
@@ -550,14 +549,13 @@ def scalar_step(particle, limit, origin, scene, anchors):
 
     For OFF_WALL the time of flight is the share of the wall's size by which the particle is off it.
     """
-    if origin != MET:
-        if not set_anchors(scene.laws, anchors, particle.t, particle.t_low):
-            return FAR_TIME, 0.0, particle
-        if origin == GIVEN and particle.wall != NO_WALL:
-            gap, size = wall_gap(particle, scene, anchors)
-            if abs(gap) > ON_WALL * size:
-                return OFF_WALL, gap / size, particle
-        crossed = crossed_wall(particle, scene, anchors)
-        if crossed != NO_WALL:
-            return BEYOND + crossed, 0.0, particle
+    if not set_anchors(scene.laws, anchors, particle.t, particle.t_low):
+        return FAR_TIME, 0.0, particle
+    if origin == GIVEN and particle.wall != NO_WALL:
+        gap, size = wall_gap(particle, scene, anchors)
+        if abs(gap) > ON_WALL * size:
+            return OFF_WALL, gap / size, particle
+    crossed = crossed_wall(particle, scene, anchors)
+    if crossed != NO_WALL:
+        return BEYOND + crossed, 0.0, particle
     return step(particle, limit, scene, anchors)

@@ -14,7 +14,7 @@ from types import ModuleType
 
 import numpy as np
 
-from fast.batch import LaneRound, as_particle, followed_paths, residual
+from fast.batch import LaneRound, as_particle, residual, take_careful_steps
 from fast.kernel import lanes, pools, records
 from fast.kernel.fine_step import fine_path
 from fast.kernel.records import DEPTH, RATE, FloatArray
@@ -88,7 +88,7 @@ class Round(LaneRound):
 
     def careful_step(self, p: FloatArray, wall: int) -> tuple[int, float, FloatArray]:
         """Return the scalar step's wall, its time, and the state after, from a state and its wall."""
-        paths = followed_paths(self.compiled, p[None], np.array([wall]), 1, np.inf)
+        paths = take_careful_steps(self.compiled, p[None], np.array([wall]))
         return int(paths.codes[0]), float(paths.steps[0, 0, 0]), paths.ends[0]
 
     def careful(self, p: FloatArray, wall: int) -> tuple[int, FloatArray]:

@@ -245,7 +245,7 @@ def test_growth_is_never_negative(amplitudes: list[float], cos: tuple[float, ...
         )
     except InvalidScene:
         assume(False)
-    found = captures(Cycle.of(scene, 4), 10)
-    assert found.growth() >= 0
-    assert 0 < found.p_not_captured < 1
-    assert abs(found.taylor(-1, 0)[0] - 1) < 1e-8
+    found = predict(scene, 8)
+    assert found.m1 >= 0
+    assert 0 < found.p_nc < 1
+    assert abs(found.mean_exp_minus - 1) < 1e-8

@@ -75,6 +75,8 @@ def test_the_whole_of_it_is_told_as_done() -> None:
     for _ in range(2):
         told.clear()
         predict(TWICE, 3, progress=lambda *done: told.append(done))
+        assert told == sorted(told)
+        assert {number for number, _ in told} == {1, 2}
         assert told[-1] == (2, 1.0)
     assert told == [(1, 1.0), (2, 1.0)]
 

@@ -6,9 +6,8 @@ import pytest
 from mpmath import MPContext
 
 import scene
-import theory
 from theory.adiabatic import captures
-from theory.chebyshev import Grid, even_degree
+from theory.chebyshev import Grid
 from theory.critical import MANY_BITS, solve_rising
 from theory.cycle import Cycle
 
@@ -51,17 +50,6 @@ def test_halves_put_together_wrongly_would_be_seen(ctx):
     assert max(abs(a - b) for a, b in zip(found, truth, strict=True)) > 1e-3
 
 
-def test_a_degree_is_rounded_up_to_what_halves_well():
-    assert [even_degree(n) for n in (62, 88)] == [64, 88]
-    for n in range(200, 2200, 2):
-        found = even_degree(n)
-        assert n <= found <= 1.1 * n
-        odd = found
-        while odd % 2 == 0 and odd > 64:
-            odd //= 2
-        assert odd <= 64
-
-
 def test_a_root_has_all_its_digits_and_is_found_with_few():
     found = MPContext()
     found.prec = 4 * MANY_BITS
@@ -94,12 +82,3 @@ def test_many_digits_of_a_cycle_that_gains_nothing():
     with found.binary.working():
         assert abs(found.growth()) < found.binary.mpf(10) ** -digits
     assert len(found.placed) < 50
-
-
-def test_progress_tells_the_resolution_and_how_far_it_is(monkeypatch):
-    monkeypatch.setattr(theory.prediction, "FEW_DIGITS", 0)
-    told = []
-    theory.predict(scene.load("moving-cap"), 2, progress=lambda *done: told.append(done))
-    assert told == sorted(told)
-    assert {number for number, _ in told} == {1, 2}
-    assert told[-1] == (2, 1.0)

@@ -125,12 +125,6 @@ def test_the_rates_integrate_to_the_energies_of_the_cycle() -> None:
         assert float(free + held) == pytest.approx(captured.s[k], abs=1e-8)
 
 
-def test_formulas_take_arrays_with_numpy_as_number_system() -> None:
-    x = np.array([0.5, 0.0])
-    expected = [sin_phi_hat(fp, float(a), 0.25, 1.0, 2.0, 1.5) for a in x]
-    np.testing.assert_allclose(sin_phi_hat(np, x, 0.25, 1.0, 2.0, 1.5), expected, rtol=1e-15)
-
-
 @pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-anticlockwise", "frozen-mushroom"])
 def test_the_volumes_at_many_times_are_those_at_each(name):
     scene = load(name)

@@ -69,19 +69,5 @@ def test_losses_are_those_of_sums_of_cycles(name: str) -> None:
     assert loss_probability(energies, 400) == pytest.approx(saddle, rel=0.02)
 
 
-def test_losses_fall_at_the_rate() -> None:
-    energies, rate = theory.energies(load("moving-cap")), float(rarity(load("moving-cap"), 12).rate)
-    # The tail of a sum is exp(-n I) over sqrt(n), times a constant.
-    far = [loss_probability(energies, n) * n**0.5 for n in (400, 800)]
-    assert np.log(far[0] / far[1]) / 400 == pytest.approx(rate, rel=2e-3)
-
-
-def test_losses_are_those_of_drawn_cycles() -> None:
-    found = theory.at_energy(load("moving-cap"), 1e40)
-    lost = (found.draw(10, 200_000, 3)[:, -1] < 0).mean()
-    p = loss_probability(load("moving-cap"), 10)
-    assert abs(lost - p) < 4 * (p * (1 - p) / 200_000) ** 0.5 + 5e-4
-
-
 def test_cycles_that_keep_energies_have_no_rate() -> None:
     assert rarity(load("moving-cap-trivial"), 10) == (0, -0.5)

@@ -211,7 +211,7 @@ REFUSALS = [
     (lambda: theory.predict(SCENE, 4, progress=3), "progress = 3, must be a function"),
     (lambda: theory.density_at(TWICE, [0.0], 4), "captured at most once"),
     (lambda: theory.cdf_at(load("moving-cap-trivial"), [0.0], 4), "in which energies change"),
-    (lambda: theory.loss_probability(load("ergodic"), 10), "keeps its energy"),
+    *((lambda n=n: theory.loss_probability(load("ergodic"), n), "keeps its energy") for n in (1, 2, 10)),
     (lambda: theory.loss_probability(SCENE, 0), "n_cycles"),
     (lambda: theory.frozen_rates(load("frozen-mushroom")), "no frozen rates"),
     # Other arguments.

@@ -195,14 +195,6 @@ def test_who_is_upright():
     assert upright_spread(load("untilted")) > 0
 
 
-def test_a_faster_cycle_spreads_in_proportion():
-    """B goes as the walls' speed squared times the period."""
-    slow, fast_one = (
-        Mushroom(r=1.0, h=Fourier(mean=1.0, omega=omega, sin=(0.5,)), nu=0.5) for omega in (1.0, 3.0)
-    )
-    assert upright_spread(fast_one) == pytest.approx(3 * upright_spread(slow), rel=1e-6)
-
-
 def test_what_the_cap_does_not_keep_goes_as_the_mouth_squared():
     """2 nu^2 / 3 + O(nu^3), down to the narrowest that rounding leaves anything of."""
     for nu in (1e-6, 1e-5, 1e-3):

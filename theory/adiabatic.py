@@ -12,21 +12,22 @@ On every piece nu = nu_upper - (nu_upper - nu_lower) I(u), where I is the polyno
 leaves 0 as u^p and reaches 1 as (1 - u)^q: with the piece's orders p, q all this is analytic in
 u on [0, 1]. Where nu would turn a hair beyond a piece's end, times are nearly singular there: nu_upper or
 nu_lower is then that turn's, and the piece a part of [0, 1]. Intervals of u are halved until Chebyshev
-interpolation resolves them.
+interpolation resolves them, each on as few points as will do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from math import comb, log2
 from typing import Any, NamedTuple
 
 from scene.refusal import BadInput
-from theory.chebyshev import Grid, WeightedPoints, convolve, even_degree, product, shifted
+from theory.chebyshev import Grid, WeightedPoints, convolve, even_degree, product
 from theory.critical import solve_rising
-from theory.cycle import CapturePiece, Cycle, NuWell
+from theory.cycle import GUARD, CapturePiece, Cycle, NuWell
 from theory.precision import Binary
 from theory.volumes import free_share
 
@@ -37,6 +38,9 @@ FEWEST = 16  # degree of the grid at which a part is first tried; its points are
 PROMISE = 0.92  # of the digits wanted, in proportion to its degree, are to be seen on such a grid
 
 
+Sample = tuple[Any, Any, Any, Any, Any, Any]  # nu, t_in, t_out, dA / dx, dB / dx, log g
+
+
 class NotConverged(BadInput):
     """The digits asked for were not reached within the limit of work."""
 
@@ -44,16 +48,21 @@ class NotConverged(BadInput):
 class Panel(NamedTuple):
     """Values at the Chebyshev points of a part of a piece, nu falling.
 
-    A and B run on from the panel before; `rate` is dA / dx with x in [0, 1] across the panel.
+    A and B run on from the panel before; `rate` and `B_rate` are dA / dx and dB / dx with x in [0, 1] across
+    the panel. p_cha is exp(-A).
     """
 
+    grid: Grid
+    descent: Descent
     nu: list[Any]
     t_in: list[Any]
     t_out: list[Any]
     rate: list[Any]
+    B_rate: list[Any]
     log_g: list[Any]
     A: list[Any]
     B: list[Any]
+    p_cha: list[Any]
 
     @property
     def s(self) -> list[Any]:
@@ -105,13 +114,9 @@ class Placed(NamedTuple):
 
 @dataclass(frozen=True)
 class Captures:
-    """A cycle's captured particles: panels from nu_max to nu_min within each well.
-
-    grids: on whose points panels may be sampled, by degree.
-    """
+    """A cycle's captured particles: panels from nu_max to nu_min within each well."""
 
     cycle: Cycle
-    grids: dict[int, Grid]
     target: int
     root: SolvedWell
 
@@ -120,24 +125,10 @@ class Captures:
         """The numbers that all this is told in; they are to be computed with under its `working`."""
         return self.cycle.binary
 
-    def grid(self, panel: Panel) -> Grid:
-        """Return the grid on whose points a panel is sampled."""
-        return self.grids[len(panel.nu) - 1]
-
-    @property
-    def s_not_captured(self) -> Any:
-        """Log E1 / E0 of the particles never captured. Source: Eq:lnEnc/E0."""
-        return self.root.s_nc
-
     @property
     def p_not_captured(self) -> Any:
         """Probability of staying in the chaotic zone. Source: Eq:ps at nu_min."""
         return self.binary.exp(-self.root.absorbed)
-
-    @property
-    def is_single(self) -> bool:
-        """Tell whether a particle is captured at most once per cycle."""
-        return not self.root.children
 
     @cached_property
     def placed(self) -> tuple[Placed, ...]:
@@ -145,54 +136,43 @@ class Captures:
         zero = self.binary.zero
         return tuple(_placed(self.root, zero, zero, zero))
 
-    @cached_property
-    def point_masses(self) -> WeightedPoints:
-        """The distribution of s as weighted points, exact for what the grid resolves."""
-        return self._point_masses(self.root)
-
-    def mean(self, f: Callable[[Any], Any]) -> Any:
-        """Return the mean of f(log E1 / E0) over all particles, the uncaptured ones included."""
-        return self.binary.fsum([w * f(s) for w, s in self.point_masses])
-
     def growth(self) -> Any:
         """Return m1, the integral of g - 1 - log g over all captures. Source: Eq:Erate."""
-        binary, total = self.binary, self.binary.zero
+        total = self.binary.zero
         for panel in (placed.panel for placed in self.placed):
-            density = [rate * binary.exp(-a) for rate, a in zip(panel.rate, panel.A, strict=True)]
-            gain = [binary.expm1(log_g) - log_g for log_g in panel.log_g]
-            total += self.grid(panel).integral([y * p for y, p in zip(gain, density, strict=True)])
+            columns = zip(panel.rate, panel.B_rate, panel.log_g, panel.p_cha, strict=True)
+            total += panel.grid.integral([(b - a - a * log_g) * p for a, b, log_g, p in columns])
         return total
 
-    def taylor(self, q: Any, order: int) -> list[Any]:
-        """Return the coefficients, up to `order`, of mean exp((q + x) s) in powers of x."""
-        return self._taylor(self.root, self.binary.mpf(q), order)
+    def taylor(self, q: Any, order: int, well: SolvedWell | None = None) -> list[Any]:
+        """Return the coefficients, up to `order`, of mean exp((q + x) s) in powers of x, of a well or all."""
+        binary, well = self.binary, well or self.root
+        spent = well.A_end - well.A_top
+        passed = _exponential(binary, binary.exp(-spent), (well.B_end - well.B_top) - spent, q, order)
+        for child in well.children:
+            passed = product(passed, self.taylor(q, order, child))
+        terms = [_exponential(binary, w, s, q, order) for w, s in self.captured(well)]
+        return [binary.fsum(column) for column in zip(passed, *terms, strict=True)]
 
     def captured(self, well: SolvedWell) -> WeightedPoints:
         """Return the particles captured on a well's own panels, from its top: d p_ell = exp(-A) dA."""
-        exp, gain = self.binary.exp, well.B_top - well.A_top
+        share, gain = self.binary.exp(well.A_top), well.B_top - well.A_top
         return [
-            (weight * rate * exp(well.A_top - a), s - gain)
+            (share * weight * rate * p, s - gain)
             for panel in well.panels
-            for weight, rate, a, s in zip(self.grid(panel).weights, panel.rate, panel.A, panel.s, strict=True)
+            for weight, rate, p, s in zip(panel.grid.weights, panel.rate, panel.p_cha, panel.s, strict=True)
         ]
 
-    def _point_masses(self, well: SolvedWell) -> WeightedPoints:
-        binary = self.binary
+    def point_masses(self, well: SolvedWell | None = None) -> WeightedPoints:
+        """Return the distribution of s as weighted points, exact for what grids resolve; of a well or all."""
+        binary, well = self.binary, well or self.root
         below: WeightedPoints = [(binary.one, binary.zero)]
         if well.children:
             grid = Grid(binary, 2 * (6 + self.target // 3))
-            below = reduce(lambda x, y: convolve(grid, x, y), map(self._point_masses, well.children))
+            below = reduce(lambda x, y: convolve(grid, x, y), map(self.point_masses, well.children))
         spent = well.A_end - well.A_top
-        passed = shifted(below, binary.exp(-spent), (well.B_end - well.B_top) - spent)
-        return self.captured(well) + passed
-
-    def _taylor(self, well: SolvedWell, q: Any, order: int) -> list[Any]:
-        binary, spent = self.binary, well.A_end - well.A_top
-        passed = _exponential(binary, binary.exp(-spent), (well.B_end - well.B_top) - spent, q, order)
-        for child in well.children:
-            passed = product(passed, self._taylor(child, q, order))
-        terms = [_exponential(binary, w, s, q, order) for w, s in self.captured(well)]
-        return [binary.fsum(column) for column in zip(passed, *terms, strict=True)]
+        share, gain = binary.exp(-spent), (well.B_end - well.B_top) - spent
+        return self.captured(well) + [(share * w, s + gain) for w, s in below]
 
 
 def _exponential(binary: Binary, weight: Any, s: Any, q: Any, order: int) -> list[Any]:
@@ -216,10 +196,14 @@ def _placed(well: SolvedWell, before: Any, after: Any, absorbed: Any) -> Iterato
         )
 
 
+def silent(_: float) -> None:
+    """Tell nobody of progress."""
+
+
 class Headway:
     """How far a resolution has come: the share of its pieces that is sampled, which never falls."""
 
-    def __init__(self, n_pieces: int, on_progress: Callable[[float], None] | None) -> None:
+    def __init__(self, n_pieces: int, on_progress: Callable[[float], None]) -> None:
         self._n_pieces, self._on_progress = n_pieces, on_progress
         self._n_done, self._most = 0, 0.0
 
@@ -227,12 +211,11 @@ class Headway:
         """Tell that a share of the present piece is sampled; of 1, that it is done."""
         # A part that turns out to be unresolved is sampled again by halves: the share waits for these.
         self._most = max(self._most, (self._n_done + share) / self._n_pieces)
-        if self._on_progress is not None:
-            self._on_progress(self._most)
+        self._on_progress(self._most)
         self._n_done += share == 1.0
 
 
-def captures(cycle: Cycle, target: int, on_progress: Callable[[float], None] | None = None) -> Captures:
+def captures(cycle: Cycle, target: int, on_progress: Callable[[float], None] = silent) -> Captures:
     """Resolve a cycle's captured particles by Chebyshev panels.
 
     Args:
@@ -241,36 +224,57 @@ def captures(cycle: Cycle, target: int, on_progress: Callable[[float], None] | N
         on_progress: called with the share of the work that is done, again and again.
 
     Raises:
-        NotConverged: panels as small as `most_halvings` allows do not resolve it, or the mouth nearly closes.
+        NotConverged: panels of 2^-MAX_HALVINGS of a piece do not resolve it, or the mouth nearly closes.
     """
     if cycle.nu_min < NARROWEST * cycle.nu_max:
         share = cycle.ctx.nstr(cycle.nu_min / cycle.nu_max, 3)
         raise NotConverged(f"the mouth closes to {share} of its widest, must stay above {NARROWEST:g} of it")
     binary, headway = cycle.binary, Headway(len(cycle.pieces), on_progress)
     with binary.working():
-        grids = grids_for(binary, target)
-        start = binary.zero, binary.zero
-        root = _solved_well(cycle, list(grids.values()), cycle.well, start, target, headway)
-    return Captures(cycle, grids, target, root)
+        degrees = [even_degree(2 * (12 + target))]
+        while (n := degrees[0] // 2) % 2 == 0 and n >= FEWEST:
+            degrees.insert(0, n)
+        grids = [Grid(binary, n) for n in degrees]  # each has every other point of the next
+
+        def resolved(piece: CapturePiece, start: tuple[Any, Any]) -> list[Panel]:
+            return _resolved(cycle, grids, piece, start, target, headway)
+
+        root = _solved_well(cycle.well, (binary.zero, binary.zero), resolved)
+    return Captures(cycle, target, root)
 
 
-def grids_for(binary: Binary, target: int) -> dict[int, Grid]:
-    """Return the grids, by degree from low to high, of which each has every other point of the next."""
-    degrees = [even_degree(2 * (12 + target))]
-    while (n := degrees[0] // 2) % 2 == 0 and n >= FEWEST:
-        degrees.insert(0, n)
-    return {n: Grid(binary, n) for n in degrees}
+def refined(found: Captures, on_progress: Callable[[float], None] = silent) -> Captures:
+    """Return captured particles by the same panels with twice the points, half of which are known.
+
+    Args:
+        found: from `captures`.
+        on_progress: as for `captures`.
+    """
+    binary, headway = found.binary, Headway(len(found.placed), on_progress)
+    with binary.working():
+        grids = {n: Grid(binary, 2 * n) for n in {placed.panel.grid.n for placed in found.placed}}
+
+        def doubled(panel: Panel, start: tuple[Any, Any]) -> list[Panel]:
+            known = list(zip(*panel[2:8], strict=True))
+            grid = grids[panel.grid.n]
+            finer = _panel(grid, panel.descent, _with_between(known, grid, panel.descent), start)
+            headway.at(1.0)
+            return [finer]
+
+        root = _solved_well(found.root, (binary.zero, binary.zero), doubled)
+    target = min(int(2 * PROMISE * found.target), found.cycle.digits + GUARD - 8)
+    return Captures(found.cycle, target, root)
 
 
 def _solved_well(
-    cycle: Cycle, grids: list[Grid], well: NuWell, start: tuple[Any, Any], target: int, headway: Headway
+    well: NuWell | SolvedWell, start: tuple[Any, Any], solved: Callable[[Any, tuple[Any, Any]], list[Panel]]
 ) -> SolvedWell:
     A, B = start
     panels: list[Panel] = []
-    for piece in well.pieces:
-        panels += _resolved(cycle, grids, piece, (A, B), target, headway)
+    for part in well.pieces if isinstance(well, NuWell) else well.panels:
+        panels += solved(part, (A, B))
         A, B = panels[-1].A[-1], panels[-1].B[-1]
-    children = tuple(_solved_well(cycle, grids, child, (A, B), target, headway) for child in well.children)
+    children = tuple(_solved_well(child, (A, B), solved) for child in well.children)
     return SolvedWell(tuple(panels), children, *start, A, B)
 
 
@@ -283,18 +287,25 @@ def _resolved(
     headway: Headway,
 ) -> list[Panel]:
     panels: list[Panel] = []
-    descent, most = Descent(cycle.binary, piece), most_halvings(cycle)
-    todo = [(0, 0)]  # part i of the piece's 2^halvings equal parts in u
+    swing = cycle.binary.taken(free_share(cycle.ctx, cycle.nu_max) - free_share(cycle.ctx, cycle.nu_min))
+    # Singularities on a branch lie at the values of nu at its knots and critical points. Values that differ
+    # by more than `theory.cycle.tolerance` are ends of pieces; what differs by less is one value. So a
+    # singularity is an end of the piece, or further off the end than the tolerance. Its orders, and its `top`
+    # and `bottom`, take away the nearest one at each end. A part as short as the tolerance is resolved
+    # whatever else is near, and so is any other that is shorter than its distance. What lies beside the real
+    # line may be nearer still, and is given up.
+    most = min(MAX_HALVINGS, int((cycle.ctx.dps - 10) * log2(10)))
+    todo = [Descent(cycle.binary, piece)]
     while todo:
-        i, halvings = todo.pop()
-        panel = _panel(cycle, grids, descent, (i, halvings), start, target, headway)
-        if panel is not None:
-            panels.append(panel)
-            start = panel.A[-1], panel.B[-1]
-        elif halvings < most:
-            todo += [(2 * i + 1, halvings + 1), (2 * i, halvings + 1)]
+        descent = todo.pop()
+        found = _sampled(grids, descent, target, swing, headway)
+        if found is not None:
+            panels.append(_panel(*found, start))
+            start = panels[-1].A[-1], panels[-1].B[-1]
+        elif descent.halvings < most:
+            todo += descent.halves()
         else:
-            nu, _ = descent.at(i * 0.5**halvings)
+            nu, _ = descent.at(0)
             raise NotConverged(
                 f"the cycle is not resolved to {target} digits near nu = {float(nu):.6g}"
                 f" by panels of 2^-{most} of a piece"
@@ -303,51 +314,50 @@ def _resolved(
     return panels
 
 
-def most_halvings(cycle: Cycle) -> int:
-    """Return how often a piece may be halved, which is enough wherever its functions have a singularity.
-
-    Singularities on a branch lie at the values of nu at its knots and critical points. Values that differ by
-    more than `theory.cycle.tolerance` are ends of pieces; what differs by less is one value. So a
-    singularity is an end of the piece, or further off the end than the tolerance. Its orders, and its `top`
-    and `bottom`, take away the nearest one at each end. A part as short as the tolerance is resolved whatever
-    else is near, and so is any other that is shorter than its distance. What lies beside the real line may be
-    nearer still, and is given up.
-    """
-    return min(MAX_HALVINGS, int((cycle.ctx.dps - 10) * log2(10)))
-
-
 class Descent:
-    """A piece as functions of x on [0, 1], along which nu falls.
+    """A piece, or one of the 2^halvings equal parts of it, as functions of x on [0, 1], along which nu falls.
 
     The polynomial I(u) takes nu from the piece's `top` to its `bottom`. Where these lie beyond its ends, the
     piece takes only a part of u.
     """
 
     def __init__(self, binary: Binary, piece: CapturePiece) -> None:
-        self.binary, self.piece = binary, piece.changed(binary.taken)
+        self.binary, self.piece, self.number, self.halvings = binary, piece.changed(binary.taken), 0, 0
         (self._top, p), (bottom, q) = self.piece.top, self.piece.bottom
         self._drop, self._orders, m = self._top - bottom, (p, q), p + q - 1
         self._powers = [(j, m - j, comb(m, j)) for j in range(p, m + 1)]
         self._start, stop = self._place(self.piece.nu_upper), self._place(self.piece.nu_lower)
-        self._length = stop - self._start
+        self._length, self._2_by_pi = stop - self._start, 2 / binary.pi
+
+    def halves(self) -> list[Descent]:
+        """Return the two halves, the later one first."""
+        late, early = copy(self), copy(self)
+        late.number, early.number = 2 * self.number + 1, 2 * self.number
+        late.halvings = early.halvings = self.halvings + 1
+        return [late, early]
 
     def at(self, x: Any) -> tuple[Any, Any]:
         """Return nu and d nu / dx."""
-        share, slope = self._share(self._start + x * self._length)
+        width = self.binary.ldexp(self._length, -self.halvings)
+        share, slope = self._share(self._start + (self.number + x) * width)
+        nu = self._top - self._drop * share
         # Rounding of an end would cost half the digits of the time at which nu turns.
-        ends = {0: self.piece.nu_upper, 1: self.piece.nu_lower}
-        return ends.get(x, self._top - self._drop * share), -self._drop * slope * self._length
+        if x + self.number == 0:
+            nu = self.piece.nu_upper
+        elif x + self.number == 1 << self.halvings:
+            nu = self.piece.nu_lower
+        return nu, -self._drop * slope * width
 
-    def point(self, x: Any, width: Any) -> tuple[Any, ...]:
-        """Return nu, t_in, t_out, dA / dy, dB / dy and log g at x, y from 0 to 1 over a part of x so wide."""
+    def point(self, x: Any) -> Sample:
+        """Return nu, t_in, t_out, dA / dx, dB / dx and log g at x."""
         binary, (nu, slope) = self.binary, self.at(x)
         root = binary.sqrt((1 - nu) * (1 + nu))
-        free = 2 * (binary.asin(nu) + nu * root) / binary.pi
-        stretches = self.piece.capture, self.piece.release
-        t_in, t_out = (stretch.in_binary(nu) for stretch in stretches)
-        shares = (s.motion.stem_share(t, nu) for s, t in zip(stretches, (t_in, t_out), strict=True))
-        a, b = (1 / (free + share) for share in shares)  # V_cap / V_cha
-        d_delta = -4 * root / binary.pi * slope * width
+        free = self._2_by_pi * (binary.angle(nu, root) + nu * root)
+        capture, release = self.piece
+        t_in, t_out = capture.in_binary(nu), release.in_binary(nu)
+        d_delta = -2 * self._2_by_pi * root * slope
+        a = 1 / (free + capture.motion.stem_share(t_in, nu))  # V_cap / V_cha
+        b = 1 / (free + release.motion.stem_share(t_out, nu))
         return nu, t_in, t_out, a * d_delta, b * d_delta, binary.log(b / a)
 
     def _share(self, u: Any) -> tuple[Any, Any]:
@@ -368,41 +378,47 @@ class Descent:
         return solve_rising(self.binary, rising, self.binary.zero, one)
 
 
-def _panel(
-    cycle: Cycle,
-    grids: list[Grid],
-    descent: Descent,
-    part: tuple[int, int],
-    start: tuple[Any, Any],
-    target: int,
-    headway: Headway,
-) -> Panel | None:
-    """Sample a part of a piece and integrate from `start` = (A, B); None when it is not resolved.
+def _sampled(
+    grids: list[Grid], descent: Descent, target: int, swing: Any, headway: Headway
+) -> tuple[Grid, Descent, list[Sample]] | None:
+    """Sample a part of a piece on the first grid that resolves it; None when none does.
 
-    It is sampled on one grid after another, given up where one shows that the next will not do. Coefficients
-    fall geometrically, or more slowly near a singularity: were that wrong, the part would only be halved once
-    more than needed.
+    It is given up where a grid shows that the next will not do. Coefficients fall geometrically, or more
+    slowly near a singularity: were that wrong, the part would only be halved once more than needed.
     """
-    ctx, width, n = cycle.ctx, cycle.binary.ldexp(cycle.binary.one, -part[1]), grids[-1].n
-    swing = cycle.binary.taken(free_share(ctx, cycle.nu_max) - free_share(ctx, cycle.nu_min))
-    known: dict[int, tuple[Any, ...]] = {}
+    samples = [descent.point(x) for x in grids[0].points[::2]]
     for grid in grids:
-        places = range(0, n + 1, n // grid.n)
-        headway.at((part[0] + len(known) / (n + 2)) * 0.5 ** part[1])
-        new = [k for k in places if k not in known]
-        samples = [descent.point((part[0] + grids[-1].points[k]) * width, width) for k in new]
-        known.update(zip(new, samples, strict=True))
-        nu, t_in, t_out, dA, dB, log_g = (
-            list(column) for column in zip(*map(known.get, places), strict=True)
-        )
-        c_A, c_B, c_g = map(grid.coefficients, (dA, dB, log_g))
+        headway.at((descent.number + 1 - grids[0].n / grid.n) * 0.5**descent.halvings)
+        samples = _with_between(samples, grid, descent)
+        _, _, _, *columns = map(list, zip(*samples, strict=True))
+        c_A, c_B, c_g = map(grid.coefficients, columns)
         # Of a narrow mouth a and b are large, and A and B in proportion.
         tail = max(_tail(c_g), *(_tail(c) / max(swing, *map(abs, c)) for c in (c_A, c_B)))
-        share = 1 if grid.n == n else PROMISE * grid.n / n
-        if tail > cycle.binary.mpf(10) ** (-target * share):
-            return None
-    A, B = ([at + rise for rise in grid.running_integral(c)] for at, c in zip(start, (c_A, c_B), strict=True))
-    return Panel(nu, t_in, t_out, dA, log_g, A, B)
+        n_digits = -descent.binary.log10(tail)
+        if n_digits >= target:
+            return grid, descent, samples
+        if n_digits < target * PROMISE * grid.n / grids[-1].n:
+            break
+    return None
+
+
+def _with_between(known: list[Sample], grid: Grid, descent: Descent) -> list[Sample]:
+    """Return samples at all points of a grid, of which those at every other one are known."""
+    new = [descent.point(x) for x in grid.points[1::2]]
+    samples = [*known, *new]
+    samples[::2], samples[1::2] = known, new
+    return samples
+
+
+def _panel(grid: Grid, descent: Descent, samples: list[Sample], start: tuple[Any, Any]) -> Panel:
+    """Integrate over a part of a piece from `start`."""
+    nu, t_in, t_out, rate, B_rate, log_g = map(list, zip(*samples, strict=True))
+    A, B = (
+        [at + rise for rise in grid.running_integral(grid.coefficients(values))]
+        for at, values in zip(start, (rate, B_rate), strict=True)
+    )
+    p_cha = [descent.binary.exp(-a) for a in A]
+    return Panel(grid, descent, nu, t_in, t_out, rate, B_rate, log_g, A, B, p_cha)
 
 
 def _tail(coefficients: list[Any]) -> Any:

@@ -24,12 +24,11 @@ from scene.tables import Scene, check_scene
 from theory.adiabatic import Captures, SolvedWell
 from theory.cycle import Cycle
 from theory.precision import guarded
-from theory.prediction import solved
+from theory.prediction import resolutions
 
 Floats = NDArray[np.float64]
 
 DIGITS = 15
-TARGET = DIGITS + 4  # decimals to which panels are resolved
 UNRESOLVED = 1e-18  # what differs by less is not told from nothing by them
 FINE = 2048  # samples of a panel; linear interpolation between them errs by FINE^-2, 2e-7
 X = np.linspace(0.0, 1.0, FINE + 1)
@@ -52,12 +51,6 @@ class Branch(NamedTuple):
     s_after: float
     absorbed: float
     s_below: float
-
-    @property
-    def t_in(self) -> Floats:
-        """Series of the capture time."""
-        t_in: Floats = self.coefficients[1]
-        return t_in
 
     def evaluate(self, x: Floats) -> Floats:
         """Return nu, t_in, t_out, A, B, log g at x in [0, 1], exact at the ends; shape (6, len(x))."""
@@ -181,7 +174,7 @@ def tree(scene: Scene) -> Node:
 @lru_cache(maxsize=32)
 def _solved(scene: Scene) -> Node:
     # Every curve and histogram of a scene asks for its tree again. Its arrays are shared, hence read only.
-    found = solved(scene, Cycle.of(scene, DIGITS), TARGET)
+    found = next(resolutions(scene, Cycle.of(scene, DIGITS)))
     with found.binary.working():
         return _node(found, found.root, iter([_branch(found, k) for k in range(len(found.placed))]))
 
@@ -190,10 +183,9 @@ def _branch(found: Captures, k: int) -> Branch:
     placed = found.placed[k]
     p = placed.panel
     functions = (p.nu, p.t_in, p.t_out, p.A, p.B, p.log_g)
-    grid = found.grid(p)
-    coefficients = [[float(c) for c in grid.coefficients(values)] for values in functions]
+    coefficients = [[float(c) for c in p.grid.coefficients(values)] for values in functions]
     ends = [[float(values[0]), float(values[-1])] for values in functions]
-    s = _kept([float(c) for c in grid.coefficients(placed.s)])
+    s = _kept([float(c) for c in p.grid.coefficients(placed.s)])
     return Branch(_kept(coefficients), _kept(ends), s, *(float(x) for x in placed[1:]))
 
 

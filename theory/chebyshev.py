@@ -142,11 +142,6 @@ def _with_halved_ends(values: list[Any]) -> list[Any]:
 WeightedPoints = list[tuple[Any, Any]]  # weight and place
 
 
-def shifted(masses: WeightedPoints, weight: Any, shift: Any) -> WeightedPoints:
-    """Return the points moved by `shift`, their weights times `weight`."""
-    return [(weight * w, s + shift) for w, s in masses]
-
-
 def convolve(grid: Grid, first: WeightedPoints, second: WeightedPoints) -> WeightedPoints:
     """Return the distribution of a sum of independent variables, on few points."""
     few, other = compressed(grid, first), compressed(grid, second)

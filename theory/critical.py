@@ -23,7 +23,6 @@ from scene.mouth import mouth_factors
 from scene.tables import Mushroom, laws, period
 from theory.volumes import NotCovered
 
-NARROW = 1  # an isolating interval from which Newton's method, kept in it, comes to all digits
 MANY_BITS = 512  # beyond which Newton's method begins with fewer
 
 
@@ -164,7 +163,8 @@ def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[CriticalRoot]:
         n = sturms[0].n_roots(left, right)
         if n == 0:
             continue
-        if n == 1 and right - left <= NARROW and exact.at(simple, left) != 0 != exact.at(simple, right):
+        # In an interval of length 1 Newton's method, kept in it, comes to all digits.
+        if n == 1 and right - left <= 1 and exact.at(simple, left) != 0 != exact.at(simple, right):
             found.append(CriticalRoot(left, right, sum(s.n_roots(left, right) for s in sturms), simple))
             continue
         middle = (left + right) / 2
@@ -192,8 +192,9 @@ def _refined(ctx: Any, root: CriticalRoot) -> Any:
 
 def quadratic_roots(ctx: Any, c: Any = 0, b: Any = 0, a: Any = 0) -> list[Any]:
     """Return the roots of c + b x + a x^2; the real part of complex ones."""
-    root = ctx.sqrt(max(b * b - 4 * a * c, ctx.zero))
-    q = -(b + root if b > 0 else b - root) / 2
+    half = b / 2
+    root = ctx.sqrt(max(half * half - a * c, ctx.zero))
+    q = -half - root if b > 0 else root - half
     return [over / under for over, under in ((q, a), (c, q)) if under]
 
 
@@ -213,9 +214,8 @@ def solve_rising(ctx: Any, f: Any, low: Any, high: Any, guess: Any = None) -> An
     if ctx.prec > MANY_BITS:
         with ctx.workprec(5 * ctx.prec // 8):
             guess = solve_rising(ctx, f, low, high, guess)
-    close = ctx.ldexp(
-        high - low, -11 * int(ctx.prec) // 20
-    )  # the step after one this small is below rounding
+    # A step as small as half the digits is followed by one below rounding.
+    close, eps = ctx.ldexp(high - low, -int(ctx.prec) // 2), ctx.eps
     x = (low + high) / 2 if guess is None or not low < guess < high else guess
     for trial in range(20 + 4 * int(ctx.prec)):
         value, slope = f(x)
@@ -228,6 +228,6 @@ def solve_rising(ctx: Any, f: Any, low: Any, high: Any, guess: Any = None) -> An
         is_trusted = low <= newton <= high and (trial < 20 or trial % 2 == 0)
         step = (newton if is_trusted else (low + high) / 2) - x
         x += step
-        if (is_trusted and abs(step) <= close) or high - low <= ctx.eps * abs(x):
+        if (is_trusted and abs(step) <= close) or high - low <= eps * abs(x):
             break
     return x

@@ -85,13 +85,12 @@ def largest_gain(scene: Scene) -> tuple[float, float] | None:
 
     Source: Fig:protocol, right, and the right mode of Fig:E1/E0.
     """
-    best: tuple[float, float] | None = None
-    for branch in tree(scene).all_branches():
-        curve = _curve(branch, turns(branch.s))
-        k = int(np.argmax(curve.s))
-        if best is None or curve.s[k] > best[1]:
-            best = float(curve.t_in[k]), float(curve.s[k])
-    return best
+    curves = [_curve(branch, turns(branch.s)) for branch in tree(scene).all_branches()]
+    points = [(float(s), float(t)) for curve in curves for s, t in zip(curve.s, curve.t_in, strict=True)]
+    if not points:
+        return None
+    s, t_in = max(points, key=lambda point: point[0])
+    return t_in, s
 
 
 def energy_density(scene: Scene, edges: ArrayLike) -> Floats:
@@ -134,7 +133,7 @@ def capture_time_mass(scene: Scene, edges: ArrayLike) -> Floats:
     Source: Eq:ps.
     """
     bounds = _rising(edges)
-    captured = (branch.below(branch.t_in, bounds) for branch in tree(scene).all_branches())
+    captured = (branch.below(branch.coefficients[1], bounds) for branch in tree(scene).all_branches())
     return np.diff(sum(captured, np.zeros_like(bounds)))
 
 

@@ -23,7 +23,7 @@ from theory.critical import solve_rising
 from theory.precision import guarded
 from theory.prediction import converged
 from theory.validation import real_numbers
-from theory.volumes import NotCovered, delta_slope
+from theory.volumes import NotCovered, delta_slope, free_share
 
 REACH = 2.0**-12  # of a panel, around a turning point that is known in binary64
 
@@ -70,7 +70,7 @@ class _Panel:
     """One panel's s, A and times as series."""
 
     def __init__(self, found: Captures, placed: Placed) -> None:
-        self.binary, grid = found.binary, found.grid(placed.panel)
+        self.binary, grid = found.binary, placed.panel.grid
 
         def series(values: list[Any]) -> ChebyshevSeries:
             return ChebyshevSeries(self.binary, grid.coefficients(values))
@@ -116,7 +116,7 @@ class _Panel:
 
 
 def _panels(found: Captures) -> list[_Panel]:
-    if not found.is_single:
+    if found.root.children:
         raise NotCovered("densities are of cycles in which a particle is captured at most once")
     size = max((abs(s) for placed in found.placed for s in placed.s), default=1)
     if size < _resolution(found):
@@ -191,7 +191,7 @@ def cdf_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
         resolution = _resolution(found)
 
         def probability(level: Any) -> Any:
-            total = found.p_not_captured if found.s_not_captured - resolution <= level else binary.zero
+            total = found.p_not_captured if found.root.s_nc - resolution <= level else binary.zero
             for panel, (a, b, s_a, s_b) in stretches:
                 is_point_mass = abs(s_a - s_b) <= resolution
                 if level < min(s_a, s_b) - (resolution if is_point_mass else 0):
@@ -263,8 +263,8 @@ def _rate(found: Captures, time: Any) -> Any:
     for piece in cycle.pieces:
         if piece.capture.upper <= time <= piece.capture.lower:
             nu, rate = piece.capture.motion.nu(time)
-            now = piece.capture.motion.volumes(time, nu)
-            flux = now.v_cap / now.v_cha * delta_slope(ctx, nu) * rate
+            stem = piece.capture.motion.stem_share(binary.taken(time), binary.taken(nu))
+            flux = delta_slope(ctx, nu) * rate / (free_share(ctx, nu) + binary.given(stem))
             return binary.exp(-_spent(found, binary.taken(time))) * binary.taken(flux)
     return binary.zero
 
@@ -273,6 +273,6 @@ def _spent(found: Captures, time: Any) -> Any:
     """Return A at a time of capture."""
     binary = found.binary
     panel = next(p.panel for p in found.placed if p.panel.t_in[0] <= time <= p.panel.t_in[-1])
-    t_in, A = (ChebyshevSeries(binary, found.grid(panel).coefficients(v)) for v in (panel.t_in, panel.A))
+    t_in, A = (ChebyshevSeries(binary, panel.grid.coefficients(v)) for v in (panel.t_in, panel.A))
     rate = t_in.rate()
     return A(solve_rising(binary, lambda x: (t_in(x) - time, rate(x)), binary.zero, binary.one))

@@ -53,7 +53,7 @@ def rarity(scene: Scene, digits: int = 15) -> Rarity:
 
 def _least(found: Captures) -> tuple[Any, ...]:
     binary = found.binary
-    size = max((abs(s) for _, s in found.point_masses), default=binary.zero)
+    size = max((abs(s) for _, s in found.point_masses()), default=binary.zero)
     if size < binary.mpf(10) ** -found.target:
         return binary.zero, -binary.one / 2
 

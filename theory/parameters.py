@@ -7,13 +7,11 @@ inverted in closed form where parameters are parabolas, else from a solution in 
 
 from __future__ import annotations
 
-import cmath
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from itertools import zip_longest
-from typing import Any
+from typing import Any, NamedTuple
 
-import gmpy2
 from mpmath import fp
 
 from scene.exact import leg_polynomial
@@ -22,10 +20,15 @@ from scene.mouth import mouth_factors
 from scene.tables import Mushroom, laws
 from theory.critical import quadratic_roots, solve_rising
 from theory.precision import Binary
-from theory.volumes import Volumes, volumes_of
 
-# From t and exp(i omega t) to the law's value and rate.
-Parameter = Callable[[Any, Any], tuple[Any, Any]]
+
+class Parameter(NamedTuple):
+    """A law as two functions of t and exp(i omega t)."""
+
+    value: Callable[[Any, Any], Any]
+    rate: Callable[[Any, Any], Any]
+
+
 # From nu and a bracket to the time in it at which the mouth is nu, about; None where none is found.
 Inverse = Callable[[Any, Any, Any], Any]
 
@@ -41,15 +44,15 @@ class MovingMushroom:
     def __init__(self, ctx: Any, scene: Mushroom, time: Fraction) -> None:
         self.ctx, self.binary = ctx, Binary(ctx)
         pieces = {name: piece_at(law, time) for name, law in laws(scene).items()}
-        waves = [piece for piece in pieces.values() if isinstance(piece, Fourier)]
         mouth = (pieces["nu"], 1.0) if "nu" in pieces else (pieces["w"], pieces["r"])
         self._is_wavy = any(isinstance(piece, Fourier) for piece in mouth)
         with self.binary.working():
-            # Laws that move share one period.
-            self._omega = frequency(self.binary, waves[0]) if waves else None
+            self._turn = _turning(self.binary, pieces.values())
             self._parameters = {name: _parameter(self.binary, piece) for name, piece in pieces.items()}
+            self._half, self._4_by_pi = self.binary.one / 2, 4 / self.binary.pi
+            self.mouth = _mouth(self.binary, mouth)
             self._near: Inverse = (
-                _inverse_of_waves(self.binary, *mouth)
+                _inverse_of_waves(self.binary, mouth)
                 if self._is_wavy
                 else _inverse_of_parabolas(self.binary, *mouth_factors(scene), time)
             )
@@ -60,24 +63,12 @@ class MovingMushroom:
             nu, rate = self.mouth(self.binary.taken(t))
             return self.binary.given(nu), self.binary.given(rate)
 
-    def volumes(self, t: Any, nu: Any) -> Volumes:
-        """Return the volumes at time t, where the mouth is nu."""
-        with self.binary.working():
-            found = [self.binary.given(x) for x in self._of(self.binary.taken(t), "r", "h", "slope")]
-        return volumes_of(self.ctx, found[0], nu, *found[1:])
-
-    def mouth(self, t: Any) -> tuple[Any, Any]:
-        """Return `nu` in binary numbers."""
-        turn = self._turn(t)
-        if "nu" in self._parameters:
-            return self._parameters["nu"](t, turn)
-        (w, w_rate), (r, r_rate) = (self._parameters[name](t, turn) for name in ("w", "r"))
-        return w / r, (w_rate * r - w * r_rate) / (r * r)
-
     def stem_share(self, t: Any, nu: Any) -> Any:
         """Return V_stem / V_cap at time t in binary numbers, where the mouth is nu. Source: Eq:Vcap."""
-        r, h, slope = self._of(t, "r", "h", "slope")
-        return 2 * h * (2 * nu * r - h * slope) / (self.binary.pi * r * r)
+        turn = self._turn(t)
+        r, h, slope = (self._parameters[name].value(t, turn) for name in ("r", "h", "slope"))
+        depth = h / r
+        return self._4_by_pi * depth * (nu - self._half * depth * slope)
 
     def time(self, nu: Any, low: Any, high: Any, is_falling: bool) -> Any:
         """Return the time in [low, high] at which a mouth that falls, or rises, is nu; in binary numbers."""
@@ -92,80 +83,87 @@ class MovingMushroom:
 
         return solve_rising(self.binary, rising, low, high, near)
 
-    def _of(self, t: Any, *names: str) -> list[Any]:
-        turn = self._turn(t)
-        return [self._parameters[name](t, turn)[0] for name in names]
 
-    def _turn(self, t: Any) -> Any:
-        if self._omega is None:
-            return None
-        sin, cos = gmpy2.sin_cos(self._omega * t)
-        return gmpy2.mpc(cos, sin)
+def _turning(system: Any, pieces: Iterable[Piece]) -> Callable[[Any], Any]:
+    """Return exp(i omega t) as a function of t; laws that move share one omega."""
+    waves = [piece for piece in pieces if isinstance(piece, Fourier)]
+    if not waves:
+        return lambda t: None
+    omega = frequency(system, waves[0])
+    return lambda t: system.expj(omega * t)
 
 
-def _parameter(binary: Binary, piece: Piece) -> Parameter:
+def _mouth(system: Any, pieces: tuple[Piece, Piece]) -> Callable[[Any], tuple[Any, Any]]:
+    """Return w / r and its rate as a function of t, from the pieces of w and r."""
+    turning, (width, radius) = _turning(system, pieces), (_parameter(system, piece) for piece in pieces)
+
+    def mouth(t: Any) -> tuple[Any, Any]:
+        turn = turning(t)
+        w, r = width.value(t, turn), radius.value(t, turn)
+        return w / r, (width.rate(t, turn) * r - w * radius.rate(t, turn)) / (r * r)
+
+    return mouth
+
+
+def _parameter(system: Any, piece: Piece) -> Parameter:
     if isinstance(piece, Quadratic):
-        origin, c0, c1, c2 = (exact(binary, number) for number in piece[:4])
+        origin, c0, c1, c2 = (exact(system, number) for number in piece[:4])
 
-        def parabola(t: Any, _: Any) -> tuple[Any, Any]:
+        twice = 2 * c2
+
+        def value(t: Any, _: Any) -> Any:
             x = t - origin
-            return c0 + x * (c1 + x * c2), c1 + 2 * x * c2
+            return c0 + x * (c1 + x * c2)
 
-        return parabola
+        return Parameter(value, lambda t, _: c1 + (t - origin) * twice)
     if isinstance(piece, Fourier):
-        return _wave(piece, frequency(binary, piece), gmpy2.mpc)
-    constant = binary.mpf(piece), binary.zero
-    return lambda t, turn: constant
+        return _wave(system, piece)
+    constant, zero = system.mpf(piece), system.zero
+    return Parameter(lambda t, turn: constant, lambda t, turn: zero)
 
 
-def _wave(law: Fourier, omega: Any, number: Callable[[float, float], Any]) -> Parameter:
-    """Sum a wave by Horner's scheme, in complex numbers that `number` makes of two real ones."""
-    amplitudes = {k: number(c, -s) for k, c, s in law.harmonics()}
-    zero = number(0.0, 0.0)
-    terms = [(amplitudes.get(k, zero), k * amplitudes.get(k, zero)) for k in range(max(amplitudes), 0, -1)]
+def _wave(system: Any, law: Fourier) -> Parameter:
+    """Sum a wave by Horner's scheme in complex numbers."""
+    omega, zero = frequency(system, law), system.mpc(0.0, 0.0)
+    amplitudes = {k: system.mpc(c, -s) for k, c, s in law.harmonics()}
+    terms = [amplitudes.get(k, zero) for k in range(max(amplitudes), 0, -1)]
+    slopes = [k * amplitudes.get(k, zero) for k in range(max(amplitudes), 0, -1)]
 
-    def wave(_: Any, turn: Any) -> tuple[Any, Any]:
-        value = rate = zero
-        for a, k_a in terms:
-            value, rate = value * turn + a, rate * turn + k_a
-        return law.mean + (value * turn).real, -omega * (rate * turn).imag
+    def total(coefficients: list[Any], turn: Any) -> Any:
+        found = zero
+        for a in coefficients:
+            found = (found + a) * turn
+        return found
 
-    return wave
+    return Parameter(
+        lambda t, turn: law.mean + total(terms, turn).real, lambda t, turn: -omega * total(slopes, turn).imag
+    )
 
 
 def _inverse_of_parabolas(binary: Binary, width: Law, radius: Law, time: Fraction) -> Inverse:
     """Invert w / r of the parabolas or constants that two laws are near a time: a quadratic equation."""
     powers = [[exact(binary, c) for c in leg_polynomial(law, time)] for law in (width, radius)]
-    base = exact(binary, time)
+    pairs, base = list(zip_longest(*powers, fillvalue=binary.zero)), exact(binary, time)
 
     def inverse(nu: Any, low: Any, high: Any) -> Any:
-        found = quadratic_roots(binary, *(w - nu * r for w, r in zip_longest(*powers, fillvalue=0)))
-        return next((base + x for x in found if low < base + x < high), None)
+        roots = quadratic_roots(binary, *[w - nu * r for w, r in pairs])
+        return next((base + root for root in roots if low < base + root < high), None)
 
     return inverse
 
 
-def _inverse_of_waves(binary: Binary, width: Piece, radius: Piece) -> Inverse:
-    """Invert w / r of waves or constants in binary64."""
-    known = [_in_floats(piece) for piece in (width, radius)]
+def _inverse_of_waves(binary: Binary, pieces: tuple[Piece, Piece]) -> Inverse:
+    """Invert w / r of waves and constants in binary64."""
+    mouth = _mouth(fp, pieces)
 
     def inverse(nu: Any, low: Any, high: Any) -> Any:
         level, start, end = float(nu), float(low), float(high)
+        sign = 1.0 if mouth(start)[0] < mouth(end)[0] else -1.0
 
-        def excess(t: float) -> tuple[float, float]:
-            (w, w_rate), (r, r_rate) = (law(t) for law in known)
-            return w / r - level, (w_rate * r - w * r_rate) / (r * r)
+        def rising(t: float) -> tuple[float, float]:
+            value, rate = mouth(t)
+            return sign * (value - level), sign * rate
 
-        sign = 1.0 if excess(start)[0] < excess(end)[0] else -1.0
-        return binary.mpf(solve_rising(fp, lambda t: [sign * x for x in excess(t)], start, end))
+        return binary.mpf(solve_rising(fp, rising, start, end))
 
     return inverse
-
-
-def _in_floats(piece: Piece) -> Callable[[float], tuple[float, float]]:
-    if not isinstance(piece, Fourier):
-        assert isinstance(piece, float)
-        return lambda t: (piece, 0.0)
-    omega = float(frequency(fp, piece))
-    wave = _wave(piece, omega, complex)
-    return lambda t: wave(t, cmath.exp(1j * omega * t))

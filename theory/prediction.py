@@ -1,8 +1,8 @@
 """What the adiabatic theory predicts for one cycle: the figures of secs. 3.5 and 4.
 
-Everything is computed at two or more resolutions; an answer is given when two in a row
-agree to two digits more than asked, and is then the finer of the two. A cycle in which one particle is
-captured several times is covered too.
+Everything is computed at two or more resolutions, each of which has twice the points of the one before. An
+answer is given when two in a row agree to two digits more than asked, and is then the finer of the two. A
+cycle in which one particle is captured several times is covered too.
 
 Solved cycles are kept for the next request, those of the last KEPT solutions to few digits. Their numbers
 belong to no number system, and each caller's figures to that of its own cycle: it may change that, or compute
@@ -11,7 +11,8 @@ in another thread, and nobody else is touched.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import lru_cache, partial
 from math import factorial
 from typing import Any, NamedTuple
@@ -23,15 +24,15 @@ from scene.notebook import rows
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Mushroom, Scene, laws
 from scene.transforms import backwards
-from theory.adiabatic import Captures, NotConverged, SolvedWell, captures, grids_for
+from theory.adiabatic import Captures, NotConverged, captures, refined, silent
 from theory.chebyshev import logarithm
 from theory.cycle import GUARD, Cycle
 from theory.precision import guarded
 from theory.validation import MAX_DIGITS, MAX_ORDER, one_of
 from theory.volumes import as_mushroom
 
-MAX_CYCLES = 2**53
-KEPT = 64
+MOST_RESOLUTIONS = 4
+KEPT = 32
 FEW_DIGITS = 60  # a solution takes about a megabyte then, and grows with the square of the digits
 
 
@@ -68,7 +69,7 @@ class Prediction(NamedTuple):
     @guarded
     def sd_of_mean(self, n_cycles: int) -> Any:
         """Return the standard deviation of (1/n) log E_n / E0, whose mean is m1, for independent cycles."""
-        n_cycles = check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
+        n_cycles = check_count("n_cycles", n_cycles, 1, 2**53)
         return self.sd / self.sd.context.sqrt(n_cycles)
 
 
@@ -116,7 +117,8 @@ def mean_of(scene: Scene, f: Callable[[Any], Any], digits: int = 15) -> Any:
 
     def figures(found: Captures) -> tuple[Any, ...]:
         ctx, binary = found.cycle.ctx, found.binary
-        return (found.mean(lambda s: binary.taken(one_of(ctx, "f(s)", f(binary.given(s))))),)
+        values = [(w, one_of(ctx, "f(s)", f(binary.given(s)))) for w, s in found.point_masses()]
+        return (binary.fsum([w * binary.taken(value) for w, value in values]),)
 
     return converged(scene, digits, figures)[0]
 
@@ -181,7 +183,7 @@ def _figures(found: Captures) -> tuple[Any, ...]:
     return (
         found.p_not_captured,
         found.growth(),
-        found.s_not_captured,
+        found.root.s_nc,
         found.binary.sqrt(max(2 * second - first**2, found.binary.zero)),
         found.taylor(-1, 0)[0],
         found.taylor(1, 0)[0],
@@ -204,46 +206,47 @@ def converged(
     ctx, binary = cycle.ctx, cycle.binary
     noise, agreement = ctx.mpf(10) ** -(digits + GUARD - 10), ctx.mpf(10) ** -(digits + 2)
     previous: tuple[Any, ...] | None = None
-    for number, target in enumerate(range(digits + 4, digits + GUARD - 8, 12), 1):
-        on_progress = None if progress is None else partial(progress, number)
-        found = solved(scene, cycle, target, on_progress)
+    for found in resolutions(scene, cycle, progress):
         with binary.working():
             current = tuple(binary.given(x) for x in figures(found))
         current = tuple(ctx.zero if abs(x) < noise else x for x in current)
-        if previous is not None and len(current) == len(previous):
-            changes = (abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True))
-            if all(changes):
-                return current
+        if (
+            previous is not None
+            and len(current) == len(previous)
+            and all(abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True))
+        ):
+            return current
         previous = current
     raise NotConverged(f"two resolutions in a row do not agree to {digits} digits")
 
 
-def solved(
-    scene: Scene, cycle: Cycle, target: int, on_progress: Callable[[float], None] | None = None
-) -> Captures:
-    """Return a cycle's captures: see `theory.adiabatic.captures`.
+def resolutions(
+    scene: Scene, cycle: Cycle, progress: Callable[[int, float], None] | None = None
+) -> Iterator[Captures]:
+    """Yield a cycle's captures, resolved more and more finely.
 
     Args:
         scene: what the cycle is of.
         cycle: `Cycle.of` the scene.
-        target: as for `captures`.
-        on_progress: as for `captures`; what is kept is reported as done.
+        progress: called with the number of the resolution and the share of it that is done; what is kept is
+            reported as done.
 
     Raises:
         NotConverged: as `captures`.
     """
-    if cycle.digits > FEW_DIGITS:
-        return captures(cycle, target, on_progress)
-    place = _place(tuple(laws(scene).items()), cycle.digits, target)
-    if not place:
-        place.append(captures(cycle, target, on_progress).root)
-    elif on_progress is not None:
-        on_progress(1.0)
-    with cycle.binary.working():
-        return Captures(cycle, grids_for(cycle.binary, target), target, place[0])
+    kept = _place(tuple(laws(scene).items()), cycle.digits) if cycle.digits <= FEW_DIGITS else []
+    for number in range(MOST_RESOLUTIONS):
+        on_progress = silent if progress is None else partial(progress, number + 1)
+        if number < len(kept):
+            on_progress(1.0)
+        elif number == 0:
+            kept.append(captures(cycle, cycle.digits + 4, on_progress))
+        else:
+            kept.append(refined(kept[-1], on_progress))
+        yield replace(kept[number], cycle=cycle)
 
 
 @lru_cache(maxsize=KEPT)
-def _place(given: tuple[tuple[str, Law], ...], digits: int, target: int) -> list[SolvedWell]:
-    """Return the place of a solution: a list, empty at first."""
+def _place(given: tuple[tuple[str, Law], ...], digits: int) -> list[Captures]:
+    """Return the place of the solutions of a cycle: a list, empty at first."""
     return []

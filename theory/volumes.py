@@ -158,12 +158,7 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
     nu = at(mushroom.w) / r if mushroom.w is not None else at(mushroom.nu or 0.0)
     # A valid scene has nu <= 1: what exceeds it is rounding.
     nu = np.minimum(nu, 1.0) if ctx is np else min(nu, ctx.mpf(1))
-    return volumes_of(ctx, r, nu, h, slope)
-
-
-def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any) -> Volumes:
-    """Return all volumes from the table's parameters, nu = w / r."""
-    # The numbers of a scene need no check; most of theory comes by here.
+    # The numbers of a scene need no check.
     cap, stem = _over_cap(ctx, r), _over_stem(ctx, nu * r, h, slope)
     return Volumes(cap, stem, delta(ctx, nu) * cap, free_share(ctx, nu) * cap + stem, nu)
 

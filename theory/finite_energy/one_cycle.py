@@ -163,12 +163,12 @@ class FiniteEnergy:
         second = (
             float(captured.weight @ captured.shift**2) / p if (p := float(captured.weight.sum())) else 0.0
         )
-        error = table_error(self.scene)
+        diffusion_error, lag_error = table_error(self.scene)
         # A shift of a size has an error by the rates too, in the same proportion.
-        captured_mean = second + error.lag * second**0.5
+        captured_mean = second + lag_error * second**0.5
         fields = self._fields
         turning = fields.turned / 2 + fields.turned**2
-        variance = math.hypot(fields.forgotten / 2, fields.depleted / 2, turning) + error.diffusion
+        variance = math.hypot(fields.forgotten / 2, fields.depleted / 2, turning) + diffusion_error
         drift = variance * self.peak[1] / 4
         return TheoryError(
             p * captured_mean + drift,
@@ -320,9 +320,11 @@ class FiniteEnergy:
             parts += [self._captured(masses, now, stays, end)]
         return _joined(parts), end
 
-    def _captured(self, masses: PointMasses, now: float, stays: Stays, end: float) -> PointMasses:
+    def _captured(
+        self, masses: PointMasses, now: float, stays: tuple[Floats, ...], end: float
+    ) -> PointMasses:
         """Let each particle have each stay in the island; return them at the well's end."""
-        n = len(stays.t_in)
+        n = len(stays[0])
         t_in, t_out, gain, probability = (np.tile(column, len(masses.gain)) for column in stays)
         found = self._drift(PointMasses(*(np.repeat(column, n) for column in masses)), now, t_in)
         gain = found.gain + gain
@@ -337,20 +339,6 @@ class FiniteEnergy:
             np.where(found.is_free, t_in, found.t_in),
         )
         return self._drift(released, t_out, end)
-
-
-class Stays(NamedTuple):
-    """Stays in the island that begin on a panel, (n,) each.
-
-    t_in, t_out: when.
-    gain: over the uncaptured, in log E.
-    probability: of each, given the chaotic zone at the well's top.
-    """
-
-    t_in: Floats
-    t_out: Floats
-    gain: Floats
-    probability: Floats
 
 
 def at_energy(scene: Scene, energy: float) -> FiniteEnergy:
@@ -373,14 +361,19 @@ def _solved(scene: Mushroom, energy: float) -> FiniteEnergy:
     return FiniteEnergy(scene, energy)
 
 
-def _stays(node: Node, branch: Branch, n: int, s_nc: float) -> Stays:
-    """Divide a panel's captures among point masses: of the well's n as many as it has of the captures."""
+def _stays(node: Node, branch: Branch, n: int, s_nc: float) -> tuple[Floats, ...]:
+    """Divide a panel's captures among point masses: of the well's n as many as it has of the captures.
+
+    Returns:
+        When each stay begins and ends, the gain over the uncaptured, in log E, and the probability, given the
+        chaotic zone at the well's top.
+    """
     ends = branch.chaotic(np.array([0.0, 1.0])) / node.p_top
     n = max(8, int(n * (ends[0] - ends[1]) / max(1 - node.passed, LEAST)))
     edges = np.linspace(0.0, 1.0, n + 1)
     middle = (edges[1:] + edges[:-1]) / 2
     _, t_in, t_out, *_ = branch.evaluate(middle)
-    return Stays(t_in, t_out, at(branch.s, middle) - s_nc, -np.diff(branch.chaotic(edges)) / node.p_top)
+    return t_in, t_out, at(branch.s, middle) - s_nc, -np.diff(branch.chaotic(edges)) / node.p_top
 
 
 def _joined(parts: list[PointMasses]) -> PointMasses:

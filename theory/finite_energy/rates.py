@@ -13,7 +13,7 @@ import json
 import math
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from mpmath import fp
@@ -57,13 +57,6 @@ class Rates(NamedTuple):
     depletion_error: Floats
 
 
-class TableError(NamedTuple):
-    """Relative standard errors of what a whole cycle gathers by diffusion and by lags."""
-
-    diffusion: float
-    lag: float
-
-
 class RatesAt(NamedTuple):
     """Rates at T times of a cycle.
 
@@ -89,13 +82,8 @@ def pace(scene: Scene, times: Floats) -> Floats:
     return np.asarray(np.sqrt(squares.sum(axis=0)), dtype=np.float64)
 
 
-def kick_rate(scene: Scene, t: float) -> float:
-    """Return the chaotic zone's mean d log E / dt at time t. In Eq:dE the terms in d delta cancel."""
-    return float(kick_rates(scene, np.array([t]))[0])
-
-
 def kick_rates(scene: Scene, times: Floats) -> Floats:
-    """Return `kick_rate` at times (T,)."""
+    """Return the chaotic zone's mean d log E / dt at times (T,). In Eq:dE the terms in d delta cancel."""
     now, volumes = table_at(fp, scene, times), volumes_at(np, scene, times)
     cap = 2 * np.pi**2 * now.r * now.r_rate
     widening = now.w_rate * now.h + now.w * now.h_rate - now.h * now.h_rate * now.slope
@@ -121,15 +109,6 @@ class _Found(NamedTuple):
     measured: Mushroom
     rates: Rates
     turned: bool
-
-    def phases(self, times: Floats) -> Floats:
-        """Return the measured scene's phases at the sought one's times."""
-        phase: Floats = (times / self.measured.period) % 1.0
-        return 1 - phase if self.turned else phase
-
-    def pace(self, times: Floats) -> Floats:
-        """Return the measured scene's `pace` at the sought one's times."""
-        return pace(self.measured, -times if self.turned else times)
 
 
 def _found(scene: Scene) -> _Found:
@@ -157,9 +136,11 @@ def rates_at(scene: Scene, times: Floats) -> RatesAt:
         NotCovered: as `frozen_rates`.
     """
     known = _found(scene)
-    rates, spans, speed = known.rates, _spans(known.measured), known.pace(times)
+    rates, spans = known.rates, _spans(known.measured)
+    speed = pace(known.measured, -times if known.turned else times)
+    phases = (times / known.measured.period) % 1.0
     columns = [rates.diffusion, rates.lag, rates.square, rates.depletion]
-    found = _between(np.column_stack(columns), known.phases(times), spans)
+    found = _between(np.column_stack(columns), 1 - phases if known.turned else phases, spans)
     diffusion, found = np.split(found, [len(MEMORIES)], axis=1)
     lag, square, depletion = np.split(found, 3, axis=1)
     return RatesAt(
@@ -171,8 +152,10 @@ def rates_at(scene: Scene, times: Floats) -> RatesAt:
     )
 
 
-def table_error(scene: Scene) -> TableError:
-    """Return how far a cycle's rates may be wrong altogether, phases weighted by the walls' speed.
+def table_error(scene: Scene) -> tuple[float, float]:
+    """Return relative standard errors of what a whole cycle gathers by diffusion and by lags.
+
+    Phases are weighted by the walls' speed.
 
     Raises:
         NotCovered: as `frozen_rates`.
@@ -182,7 +165,8 @@ def table_error(scene: Scene) -> TableError:
     spread, lag = rates.diffusion.sum(axis=1) * speed**2, rates.lag.mean(axis=1) * speed
     errors = [rates.diffusion_error.sum(axis=1) * speed**2, rates.lag_error.mean(axis=1) * speed]
     sums = np.abs(spread).sum(), max(float(np.abs(lag).sum()), TINY)
-    return TableError(*(float(np.sqrt((e**2).sum()) / s) for e, s in zip(errors, sums, strict=True)))
+    diffusion, lags = (np.sqrt((e**2).sum()) / s for e, s in zip(errors, sums, strict=True))
+    return float(diffusion), float(lags)
 
 
 def _between(columns: Floats, phase: Floats, spans: Floats) -> Floats:
@@ -219,20 +203,15 @@ def _is_one_cycle(measured: Mushroom, sought: Mushroom) -> bool:
         return False  # of tables at rest no rates are kept
     both = [*laws(measured).values(), *laws(sought).values()]
     times = np.array([*(length * PHASES), *(float(t) for law in both for t in breakpoints(law))])
-    for (place, rate), (its_place, its_rate) in zip(
-        _motions(measured, times), _motions(sought, times), strict=True
-    ):
+    mine, its = table_at(fp, measured, times), table_at(fp, sought, times)
+    for name in ("r", "w", "h", "slope"):
+        place, rate = getattr(mine, name), getattr(mine, f"{name}_rate")
+        its_place, its_rate = getattr(its, name), getattr(its, f"{name}_rate")
         size = np.abs(place).max()
         quickest = max(np.abs(rate).max(), size / length)  # of what rests, rounding may leave a rate
         if np.abs(place - its_place).max() > SAME * size or np.abs(rate - its_rate).max() > SAME * quickest:
             return False
     return True
-
-
-def _motions(scene: Mushroom, times: Floats) -> list[tuple[Any, Any]]:
-    """Return each parameter and its rate at times (T,), as numbers where they are constant."""
-    now = table_at(fp, scene, times)
-    return [(now.r, now.r_rate), (now.w, now.w_rate), (now.h, now.h_rate), (now.slope, now.slope_rate)]
 
 
 @lru_cache(maxsize=1)

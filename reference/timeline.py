@@ -175,10 +175,15 @@ class Legs:
         """List the ends of parabolas strictly between two times since the instant, within a period."""
         if high - low >= self.period:
             return []
-        first = self.instant + low
-        turn = (first - self.starts[0]) // self.period * self.period - self.instant
-        ends = (half.end + turn + shift for shift in (Fraction(0), self.period) for half in self.halves)
-        return [end for end in ends if low < end < high]
+        first, found = self.instant + low, []
+        turn = (first - self.starts[0]) // self.period * self.period
+        i = bisect_right(self.starts, first - turn) - 1
+        while (end := self.halves[i].end + turn - self.instant) < high:
+            found.append(end)
+            i += 1
+            if i == len(self.halves):
+                i, turn = 0, turn + self.period
+        return found
 
     def is_whole(self, length: Fraction) -> bool:
         """Tell whether the length is a period or more."""

@@ -192,12 +192,12 @@ def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
     With `fp` t may be an array of times: what moves is then an array, too.
     """
     given = laws(scene)
-    columns = []
-    for order in (0, 1):
-        now = {name: value(ctx, law, t, order) for name, law in given.items()}
-        now["w"] = half_width(ctx, scene, t, order)
-        columns.append([now.get(name, ctx.mpf(0)) for name in ("r", "w", "h", "slope")])
-    return TableAt(scene, *columns[0], *columns[1])
+    now, rate = ({name: value(ctx, law, t, order) for name, law in given.items()} for order in (0, 1))
+    if "nu" in given:
+        now["w"] = now["nu"] * now["r"]
+        rate["w"] = rate["nu"] * now["r"] + now["nu"] * rate["r"]
+    numbers = (column.get(name, ctx.mpf(0)) for column in (now, rate) for name in ("r", "w", "h", "slope"))
+    return TableAt(scene, *numbers)
 
 
 def rounded(scene: Scene, t: float) -> TableAt:

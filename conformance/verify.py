@@ -182,7 +182,9 @@ class Interval:
 
 def rounded(lo: int, hi: int, exp: int, bits: int) -> Interval:
     """Return an interval rounded outward to so many digits."""
-    extra = max(0, max(lo.bit_length(), hi.bit_length()) - bits)
+    extra = max(lo.bit_length(), hi.bit_length()) - bits
+    if extra <= 0:
+        return Interval(lo, hi, exp, bits)
     return Interval(lo >> extra, -(-hi >> extra), exp + extra, bits)
 
 
@@ -386,8 +388,9 @@ def wave_jet(
 ) -> Jet:
     """Return mean + sum of a cos + b sin of k times the phase, and its derivatives."""
     f, d1, d2 = exact(law.mean), exact(0), exact(0)
-    for k, ((a, b), (cos, sin)) in enumerate(zip(law.waves, waves, strict=True), 1):
-        value, slope = cos * exact(a) + sin * exact(b), cos * exact(b) - sin * exact(a)
+    for k, (amplitudes, (cos, sin)) in enumerate(zip(law.waves, waves, strict=True), 1):
+        a, b = map(exact, amplitudes)
+        value, slope = cos * a + sin * b, cos * b - sin * a
         f, d1, d2 = f + value, d1 + slope * k, d2 - value * (k * k)
     return Jet(f, d1 * omega, d2 * omega**2)
 

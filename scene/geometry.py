@@ -170,20 +170,14 @@ class TableAt(NamedTuple):
         return lines
 
 
-def half_width(ctx: Any, scene: Scene, t: Any, order: int = 0) -> Any:
-    """Return the half width w(t), given as w or as nu r [length], or its rate for order 1; 0 in a cap.
+def half_width(ctx: Any, scene: Scene, t: Any) -> Any:
+    """Return the half width w(t), given as w or as nu r [length]; 0 in a cap.
 
     With `fp` t may be an array of times.
     """
     if isinstance(scene, Cap):
         return ctx.mpf(0)
-    w, rate = ctx.mpf(1), ctx.mpf(0)
-    for law in width_factors(scene):
-        factor = value(ctx, law, t)
-        if order:
-            rate = rate * factor + w * value(ctx, law, t, 1)
-        w = w * factor
-    return rate if order else w
+    return math.prod(value(ctx, law, t) for law in width_factors(scene))
 
 
 def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
@@ -192,12 +186,12 @@ def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
     With `fp` t may be an array of times: what moves is then an array, too.
     """
     given = laws(scene)
-    columns = []
-    for order in (0, 1):
-        now = {name: value(ctx, law, t, order) for name, law in given.items()}
-        now["w"] = half_width(ctx, scene, t, order)
-        columns.append([now.get(name, ctx.mpf(0)) for name in ("r", "w", "h", "slope")])
-    return TableAt(scene, *columns[0], *columns[1])
+    now, rate = ({name: value(ctx, law, t, order) for name, law in given.items()} for order in (0, 1))
+    if "nu" in given:
+        now["w"] = now["nu"] * now["r"]
+        rate["w"] = rate["nu"] * now["r"] + now["nu"] * rate["r"]
+    numbers = (column.get(name, ctx.mpf(0)) for column in (now, rate) for name in ("r", "w", "h", "slope"))
+    return TableAt(scene, *numbers)
 
 
 def rounded(scene: Scene, t: float) -> TableAt:

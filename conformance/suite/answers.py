@@ -104,9 +104,8 @@ def read_answer(line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = F
         raise CheckFailure("wrong-format", f"answered seq {answered} to seq {seq}{said}")
     # A failure that is owned to is the whole answer, whatever stands beside it.
     own = Answered if envelope.outcome is not None else ANSWERS[cmd]
-    data: dict[str, Any] = msgspec.to_builtins(
-        _read(cmd, line, Failed if envelope.error is not None else own)
-    )
+    form = Failed if envelope.error is not None else own
+    data: dict[str, Any] = msgspec.to_builtins(_read(cmd, line, form, is_checked=True))
     data.pop("seq", None)
     for part in (data, *outcomes_of(data)):
         part.update({name: clean(part[name]) for name in ("reason", "error") if name in part})
@@ -156,16 +155,24 @@ def with_walls(answer: dict[str, Any], scene: Any) -> dict[str, Any]:
     return answer
 
 
-def _read(cmd: str, line: bytes, form: Any) -> Any:
-    """Decode a line, strictly: a field that stands twice is refused, and so is what is no UTF-8, anywhere."""
+def _read(cmd: str, line: bytes, form: Any, *, is_checked: bool = False) -> Any:
+    """Decode a line, strictly: a field that stands twice is refused, and so is what is no UTF-8, anywhere.
+
+    A line that was read before in another form is known to have neither.
+    """
     try:
-        if not line.isascii():
-            line.decode()
-        with suppress(json.JSONDecodeError, RecursionError):  # no JSON: the decoder says where
-            json.loads(line, object_pairs_hook=_once, parse_int=str, parse_float=str)
+        if not is_checked:
+            _refuse_ambiguous(line)
         return _decoded(with_minus_zeros(line), form)
     except UNREADABLE as error:
         raise _unreadable(cmd, error, line) from None
+
+
+def _refuse_ambiguous(line: bytes) -> None:
+    if not line.isascii():
+        line.decode()
+    with suppress(json.JSONDecodeError, RecursionError):  # no JSON: the decoder says where
+        json.loads(line, object_pairs_hook=_once, parse_int=str, parse_float=str)
 
 
 def _once(pairs: list[tuple[str, object]]) -> None:

@@ -303,9 +303,7 @@ class Process:
             return b""  # it no longer reads: its silence or its exit will tell
 
     def _is_readable(self) -> bool:
-        with selectors.DefaultSelector() as selector:
-            selector.register(self._stdout, selectors.EVENT_READ)
-            return bool(selector.select(0.0))
+        return any(key.fileobj is self._stdout for key, _ in self._selector.select(0.0))
 
     def _has_exited(self) -> bool:
         # Without reaping it: its number must stay taken until its group is killed.

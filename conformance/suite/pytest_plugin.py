@@ -12,8 +12,6 @@ from conformance.suite.checks import checks_of
 from conformance.suite.process import CheckFailure, CommandNotFound
 from conformance.suite.run import NEW_SEEDS
 from conformance.suite.session import Limits, Session
-from conformance.suite.symmetry import Transform, draw_transform
-from conformance.vectors import Vector
 from scene.refusal import BadInput, check_seed
 
 
@@ -63,12 +61,6 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "mushrooms_check" in metafunc.fixturenames:
         checks = checks_of(metafunc.config.getoption("--mushrooms-level"))
         metafunc.parametrize("mushrooms_check", checks, ids=[check.name for check in checks])
-
-
-@pytest.fixture
-def mushrooms_transform(request: pytest.FixtureRequest, mushrooms_vector: Vector) -> Transform:
-    """Return the symmetry transform by which a vector is asked."""
-    return draw_transform(mushrooms_vector, request.config.option.mushrooms_seed)
 
 
 @pytest.fixture(scope="session")

@@ -15,13 +15,14 @@ from conformance import suite
 from conformance.suite.checks import SuiteCheck, run_check
 from conformance.suite.result import Result
 from conformance.suite.session import Session
-from conformance.suite.symmetry import Transform
+from conformance.suite.symmetry import draw_transform
 from conformance.vectors import Vector
 
 
-def test_vector(mushrooms_session: Session, mushrooms_vector: Vector, mushrooms_transform: Transform) -> None:
-    """Grade one answer."""
-    _report(suite.ask_vector(mushrooms_session, mushrooms_vector, mushrooms_transform), mushrooms_vector.rule)
+def test_vector(mushrooms_session: Session, mushrooms_vector: Vector, pytestconfig: pytest.Config) -> None:
+    """Grade one answer to a vector in the image that the run's seed draws."""
+    transform = draw_transform(mushrooms_vector, pytestconfig.option.mushrooms_seed)
+    _report(suite.ask_vector(mushrooms_session, mushrooms_vector, transform), mushrooms_vector.rule)
 
 
 def test_check(mushrooms_session: Session, mushrooms_check: SuiteCheck, pytestconfig: pytest.Config) -> None:

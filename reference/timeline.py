@@ -8,7 +8,7 @@ at every time except knots.
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple, Protocol
@@ -175,15 +175,12 @@ class Legs:
         """List the ends of parabolas strictly between two times since the instant, within a period."""
         if high - low >= self.period:
             return []
-        first, found = self.instant + low, []
-        turn = (first - self.starts[0]) // self.period * self.period
-        i = bisect_right(self.starts, first - turn) - 1
-        while (end := self.halves[i].end + turn - self.instant) < high:
-            found.append(end)
-            i += 1
-            if i == len(self.halves):
-                i, turn = 0, turn + self.period
-        return found
+        begun = low - (self.instant + low - self.starts[0]) % self.period - self.starts[0]
+        i = bisect_right(self.starts, low - begun) - 1
+        following = [half.end for half in self.halves[i:]] + [
+            half.end + self.period for half in self.halves[:i]
+        ]
+        return [end + begun for end in following[: bisect_left(following, high - begun)]]
 
     def is_whole(self, length: Fraction) -> bool:
         """Tell whether the length is a period or more."""

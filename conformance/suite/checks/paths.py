@@ -113,10 +113,8 @@ def _first_flaw(
     late = LATE * np.maximum(np.abs(t0), np.abs(t))
     off_flight = np.hypot(x - x0 - vx0 * dt, y - y0 - vy0 * dt) / (size + speed * dt)
     f, steep, turn, away = 0.0 * t, 1.0 + 0.0 * t, 0.0 * t, 0.0 * t
-    for wall in scene.walls:
+    for wall in set(scene.walls).intersection(walls):
         k = np.flatnonzero(walls == wall)
-        if not k.size:
-            continue
         at = table_at(fp, scene, t[k])
         f[k] = at.gap(wall, x[k], y[k])
         steep[k] = at.r if wall == "arc" else 1.0

@@ -208,14 +208,17 @@ def test_what_pytest_cannot_ask_is_told_without_a_traceback(tmp_path, asked):
 
 def test_the_pytest_case_fails_and_skips_with_the_verdict():
     vector = next(vector for vector in vectors.load() if vector.kind == "step")
-    config = SimpleNamespace(option=SimpleNamespace(mushrooms_seed=0))
     with Session(command("missing-field")) as session:
         session.start()
         with pytest.raises(pytest.fail.Exception, match="wrong-format: "):
-            pytest_suite.test_vector(session, vector, config)
+            pytest_suite.test_vector(
+                session, vector, SimpleNamespace(option=SimpleNamespace(mushrooms_seed=0))
+            )
         session.introduction = msgspec.structs.replace(session.introduction, tables=())
         with pytest.raises(pytest.skip.Exception, match="unsupported: table"):
-            pytest_suite.test_vector(session, vector, config)
+            pytest_suite.test_vector(
+                session, vector, SimpleNamespace(option=SimpleNamespace(mushrooms_seed=0))
+            )
 
 
 PLAIN = [sys.executable, "-m", "conformance.plain"]

@@ -283,16 +283,17 @@ def check_symplectic(
     if way is None:
         return False
     begin, _, end = way
-    scale = scales(scene, state)
-    units = (scale.length, scale.length, scale.speed, scale.speed)
-    coarse, fine = (_flow_matrix(stepper, scene, way, units, width) for width in (STEP, STEP / 2))
+    length, speed, time = scales(scene, state)
+    coarse, fine = (
+        _flow_matrix(stepper, scene, way, (length, length, speed, speed), width) for width in (STEP, STEP / 2)
+    )
     if coarse is None or fine is None:
         return False
     M = [[(4 * b - a) / 3 for a, b in zip(*rows, strict=True)] for rows in zip(coarse, fine, strict=True)]
     entries = [abs(m) for row in M for m in row]
     gap = max(abs(a - b) for rows in zip(coarse, fine, strict=True) for a, b in zip(*rows, strict=True))
     # The time of the hit is rounded like t, whatever the stepper.
-    noise = bound + 2.0**-50 * max(abs(begin.t), abs(end)) / scale.time
+    noise = bound + 2.0**-50 * max(abs(begin.t), abs(end)) / time
     largest = max(entries)
     allowed = 16 * largest * gap + SLACK * largest * largest * noise / STEP
     for i in range(4):
@@ -481,20 +482,12 @@ class MeasuredStep(NamedTuple):
         return State(t, x, y, vx, vy, wall)
 
 
-class Scales(NamedTuple):
-    """Size of the table [length], speed [length/time] and the time that a crossing takes."""
-
-    length: float
-    speed: float
-    time: float
-
-
-def scales(scene: Scene, state: State) -> Scales:
-    """Return what is large for this question."""
+def scales(scene: Scene, state: State) -> tuple[float, float, float]:
+    """Return the table's size [length], the speed [length/time], and the time that a crossing takes."""
     found = {name: bounds(law) for name, law in laws(scene).items()}
     length = max(law.highest for name, law in found.items() if name in ("r", "w", "h"))
     speed = hypot(state.vx, state.vy) or max(law.slope for law in found.values()) or length
-    return Scales(length, speed, length / speed)
+    return length, speed, length / speed
 
 
 def numbers(outcome: Outcome, state: State) -> Numbers | None:
@@ -531,9 +524,8 @@ def measure_step(
     found = numbers(outcome, state)
     if found is None or not isinstance(outcome, Collision | Horizon):
         return None
-    scale = scales(scene, state)
-    nudges = [max(NUDGE * scale.time, 2.0**-46 * abs(state.t))]
-    nudges += [NUDGE * scale.length] * 2 + [NUDGE * scale.speed] * 2
+    length, speed, time = scales(scene, state)
+    nudges = [max(NUDGE * time, 2.0**-46 * abs(state.t)), *[NUDGE * length] * 2, *[NUDGE * speed] * 2]
     size = [abs(state.t), *[hypot(state.x, state.y)] * 2, *[hypot(state.vx, state.vy)] * 2]
     dt, t, x, y, vx, vy = found
     errors = [bound * part for part in (abs(dt), abs(t), *[hypot(x, y)] * 2, *[hypot(vx, vy)] * 2)]

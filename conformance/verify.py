@@ -182,9 +182,7 @@ class Interval:
 
 def rounded(lo: int, hi: int, exp: int, bits: int) -> Interval:
     """Return an interval rounded outward to so many digits."""
-    extra = max(lo.bit_length(), hi.bit_length()) - bits
-    if extra <= 0:
-        return Interval(lo, hi, exp, bits)
+    extra = max(0, max(lo.bit_length(), hi.bit_length()) - bits)
     return Interval(lo >> extra, -(-hi >> extra), exp + extra, bits)
 
 
@@ -376,8 +374,9 @@ class Clock:
         one, at_begin, at_end = number(1, self.bits), self.circle(begin, n), self.circle(end, n)
         for k in range(1, n + 1):
             first, last = at_begin[k - 1], at_end[k - 1]
-            since, until = floor_of(-4 * k * begin.lo, begin.exp), floor_of(4 * k * end.hi, end.exp)
-            quarters = range(-since, until + 1)[:4]
+            quarters = range(
+                -floor_of(-4 * k * begin.lo, begin.exp), floor_of(4 * k * end.hi, end.exp) + 1
+            )[:4]
             tops = [[one] * any(q % 4 == top for q in quarters) for top in (0, 1)]
             lows = [[-one] * any(q % 4 == low for q in quarters) for low in (2, 3)]
             yield [join(first[i], last[i], *tops[i], *lows[i]) for i in (0, 1)]
@@ -388,8 +387,8 @@ def wave_jet(
 ) -> Jet:
     """Return mean + sum of a cos + b sin of k times the phase, and its derivatives."""
     f, d1, d2 = exact(law.mean), exact(0), exact(0)
-    for k, (amplitudes, (cos, sin)) in enumerate(zip(law.waves, waves, strict=True), 1):
-        a, b = map(exact, amplitudes)
+    for k, (wave, (cos, sin)) in enumerate(zip(law.waves, waves, strict=True), 1):
+        a, b = map(exact, wave)
         value, slope = cos * a + sin * b, cos * b - sin * a
         f, d1, d2 = f + value, d1 + slope * k, d2 - value * (k * k)
     return Jet(f, d1 * omega, d2 * omega**2)

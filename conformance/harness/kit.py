@@ -57,14 +57,11 @@ def serve_engine(name: str, next_hit: NextHit) -> None:
                 raise UndecidedError("it flies along the mouth")
             answer = _answer_of(next_hit, self.scene, _leaving(self), self.t_end)
             if isinstance(answer, AnsweredCollision):
-                self.require_alone(answer)
+                at, s = answer, answer.t - self.state.t
+                other = table_at(fp, self.scene, at.t).nearest_wall(at.x, at.y, but=at.wall)
+                if abs(self.f(other, s)[0]) <= self.noise(other, s):
+                    raise UndecidedError(f"{at.wall} and {other} are met at once, within rounding")
             return answer
-
-        def require_alone(self, hit: AnsweredCollision) -> None:
-            other = table_at(fp, self.scene, hit.t).nearest_wall(hit.x, hit.y, but=hit.wall)
-            s = hit.t - self.state.t
-            if abs(self.f(other, s)[0]) <= self.noise(other, s):
-                raise UndecidedError(f"{hit.wall} and {other} are met at once, within rounding")
 
     _serve(name, partial(plain.next_collision, flight=Question))
 

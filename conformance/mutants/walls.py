@@ -187,7 +187,7 @@ def pushed_off_by_a_billionth(
     plain(scene, state, t_end)
     if flight.wall is not None:
         nx, ny, _ = flight.normal(flight.wall, 0.0)
-        flight.x, flight.y = flight.x + 1e-9 * nx, flight.y + 1e-9 * ny
+        flight.x, flight.y, flight.known = flight.x + 1e-9 * nx, flight.y + 1e-9 * ny, {}
 
 
 @mutant(Flight, "normal", COMMON)

@@ -162,17 +162,13 @@ def _read(cmd: str, line: bytes, form: Any, *, is_checked: bool = False) -> Any:
     """
     try:
         if not is_checked:
-            _refuse_ambiguous(line)
+            if not line.isascii():
+                line.decode()
+            with suppress(json.JSONDecodeError, RecursionError):  # no JSON: the decoder says where
+                json.loads(line, object_pairs_hook=_once, parse_int=str, parse_float=str)
         return _decoded(with_minus_zeros(line), form)
     except UNREADABLE as error:
         raise _unreadable(cmd, error, line) from None
-
-
-def _refuse_ambiguous(line: bytes) -> None:
-    if not line.isascii():
-        line.decode()
-    with suppress(json.JSONDecodeError, RecursionError):  # no JSON: the decoder says where
-        json.loads(line, object_pairs_hook=_once, parse_int=str, parse_float=str)
 
 
 def _once(pairs: list[tuple[str, object]]) -> None:

@@ -34,7 +34,6 @@ from typing import ClassVar, NamedTuple
 from scene.refusal import BadInput
 
 KILL_TIMEOUT = 5.0  # seconds until what cannot be killed is given up
-POLL_INTERVAL = 0.01  # seconds between looks
 SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of <linux/prctl.h>
 
 
@@ -87,7 +86,7 @@ class Descendants:
             for pid in alive:
                 with contextlib.suppress(ProcessLookupError, PermissionError):
                     os.kill(pid, signal.SIGKILL)
-            time.sleep(POLL_INTERVAL)
+            time.sleep(POLL / 5)
         self._leaders.discard(self._leader)
         _adopt_orphans(bool(self._leaders))
 

@@ -40,10 +40,9 @@ N_FRESH = {"core": ROUND, "extended": 2 * ROUND, "stress": 2 * ROUND}
 TIMED_SCENE, TIMED_STATE = "moving-cap", State(0.0, 0.1, 0.2, 300.0, 400.0)
 TIMED_MOST = 2.0  # seconds, after which no longer trajectory is asked
 TIMED_REPEATS, TIMED_LEAST = 5, 20_000_000  # timings; nanoseconds that each must last to be read from a clock
-PROTOCOL_CASES = ("start", "echo", "rejects", "stop")
 OTHER_GROUPS = (FRESH, *GROUPS)
 OTHER_CASES = (
-    *(f"protocol/{name}" for name in PROTOCOL_CASES),
+    *(f"protocol/{name}" for name in ("start", "echo", "rejects", "stop")),
     *(each.name for each in checks_of()),
 )
 Progress = Callable[[int, int], None]

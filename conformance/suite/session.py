@@ -106,10 +106,9 @@ class Session(AbstractContextManager["Session"]):
             CommandNotFound: when there is no such program.
             CheckFailure: when it does not introduce itself in protocol 1; the session is then over.
         """
-        if self._process is not None:
-            raise RuntimeError("this session has started")
-        command = self._command
-        self._process = InProcess(command) if callable(command) else Process(command, self.stderr)
+        self._process = (
+            InProcess(self._command) if callable(self._command) else Process(self._command, self.stderr)
+        )
         request = {"cmd": "start", "protocol": PROTOCOL}
         self.introduction = introduction = self._opened(request, read_introduction)
         return introduction

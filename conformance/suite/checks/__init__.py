@@ -5,7 +5,7 @@ symmetries (`properties`), statistics (`ensembles`) and the rules of the protoco
 asked of every profile that is offered. CONTRIBUTING.md says how one is added.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 
 from conformance import properties
@@ -49,9 +49,7 @@ def _symmetric(name: str, side: Implementation, scene: Scene, state: State, t_en
 
 
 def _symmetry(name: str) -> SuiteCheck:
-    asks: Callable[[Draw, str], Iterator[Question]] = moments
-    if name == "static-limit":  # needs laws, though its tables are at rest
-        asks = partial(moments, is_idle=True)
+    asks = partial(moments, is_idle=name == "static-limit")  # which needs laws, though its tables are at rest
     profiles = QUESTIONS[:2] if name in OF_HITS else QUESTIONS
     return SuiteCheck(f"property/{name}", asks, partial(_symmetric, name), profiles)
 

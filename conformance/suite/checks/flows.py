@@ -154,10 +154,10 @@ def together(
         if kinds != {"horizon"}:
             continue
         n_compared += 1
-        if part == own:
-            continue
         one, other = read_outcome(part), read_outcome(own)
-        assert distance(scene, one, other) <= ALONE, f"{where}: {one} among others, {other} alone"
+        assert part == own or distance(scene, one, other) <= ALONE, (
+            f"{where}: {one} among others, {other} alone"
+        )
         stays = part.get("captured"), own.get("captured")
         same = is_same_capture(*stays, t_end - pool[i].t)
         assert same, f"{where}: captured = {stays[0]} among others, {stays[1]} alone"

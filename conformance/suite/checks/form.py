@@ -156,8 +156,9 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
     n = n_compared = n_declined = n_open = n_asked = 0
 
     def result(verdict: str, why: str, paste: str = "") -> Result:
-        group = check.name.partition("/")[0]
-        return Result(check.name, group, verdict, why, time.monotonic() - begin, paste=paste)
+        return Result(
+            check.name, check.name.partition("/")[0], verdict, why, time.monotonic() - begin, paste=paste
+        )
 
     for profile in check.profiles:
         side = Implementation(session, profile)

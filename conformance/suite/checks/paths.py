@@ -159,10 +159,8 @@ def _meet_walls(scene: Scene, before: Any, after: Any, walls: Any, moving: Any) 
     t, x, y, vx, vy = after
     speed = np.hypot(vx0, vy0)
     f, steep, turn, away = 0.0 * t, 1.0 + 0.0 * t, 0.0 * t, 0.0 * t
-    for wall in scene.walls:
+    for wall in set(scene.walls).intersection(walls):
         k = np.flatnonzero(walls == wall)
-        if not k.size:
-            continue
         at = table_at(fp, scene, t[k])
         f[k] = at.gap(wall, x[k], y[k])
         steep[k] = at.r if wall == "arc" else 1.0

@@ -165,10 +165,8 @@ def _kinds(form: Mapping[str, Any]) -> set[str]:
 
 def _fits(form: Mapping[str, Any], value: Any) -> bool:
     """Tell whether a value is meant by a form: its type, and of objects the tag."""
-    kind = {type(None): "null", bool: "boolean", int: "integer", float: "number", str: "string"}.get(
-        type(value)
-    )
-    kind = kind or ("object" if isinstance(value, Mapping) else "array")
+    types = {type(None): "null", bool: "boolean", int: "integer", float: "number", str: "string"}
+    kind = types.get(type(value), "object" if isinstance(value, Mapping) else "array")
     tags = [(name, part["enum"]) for name, part in form.get("properties", {}).items() if "enum" in part]
     is_meant = kind != "object" or all(value.get(name, words[0]) in words for name, words in tags)
     return (kind in _kinds(form) or (kind == "integer" and "number" in _kinds(form))) and is_meant

@@ -106,37 +106,39 @@ def _first_flaw(
     t, x, y, vx, vy = after
     table = table_at(fp, scene, t)
     size = table.size + 0.0 * t
-    speed, moving = np.hypot(vx0, vy0), _speed_of_walls(table, size)
+    speed = np.hypot(vx0, vy0)
+    moving = (table.r_rate, table.w_rate, table.h_rate, table.slope_rate * size)
+    pace = speed + sum(map(np.abs, moving))
     late = LATE * np.maximum(np.abs(t0), np.abs(t))
     off_flight = np.hypot(x - x0 - vx0 * dt, y - y0 - vy0 * dt) / (size + speed * dt)
-    f, steep, turn, away = _meet_walls(scene, before, after, walls, moving)
+    f, steep, turn, away = _meet_walls(scene, before, after, walls, pace)
     # What a start is off its wall is taken out of f, so that the next hit of the same wall keeps it.
     now = table_at(fp, scene, start.t)
     first = 0.0 if start.wall is None else float(now.gap(start.wall, start.x, start.y))
     left, kept = np.append(start.wall or "", walls[:-1]), np.append(first, f[:-1])
     off_wall = np.abs(f - np.where(left == walls, kept, 0.0)) / steep / size
-    straight = walls == ""
-    turn[straight] = np.hypot(vx - vx0, vy - vy0)[straight] / np.maximum(speed, 1e-300)[straight]
-    measured = {"place": off_wall, "bounce": turn, "flight": off_flight}
-    for name, sizes in measured.items():
+    turn = np.where(walls == "", np.hypot(vx - vx0, vy - vy0) / np.maximum(speed, 1e-300), turn)
+    for name, sizes in (("place", off_wall), ("bounce", turn), ("flight", off_flight)):
         errors.setdefault(name, []).extend(sizes[-LEAST:].tolist())
     is_exact = is_fine(errors["place"], FINE) and is_fine(errors["bounce"], FINE)
     place, flight = (FINE if is_exact else COARSE), (FLIGHT if is_fine(errors["flight"], FLIGHT) else COARSE)
     aside = 64 * (late + (0.0 if is_exact else COARSE) * np.abs(dt))  # of a time
-    margin = place + aside * (speed + moving) / size
+    margin = place + aside * pace / size
     # A wall that turns soon has another speed at a time that is rounded.
-    known_laws = {name: bounds(law).curvature for name, law in laws(scene).items()}
-    turning = sum(bend * (size if name in ("nu", "slope") else 1.0) for name, bend in known_laws.items())
-    rounding = margin + aside * turning / (speed + moving)
-    beyond = _beyond(scene, before, dt, walls, (x, y))
-    beyond -= 2 * np.abs(kept) / np.append(now.r if start.wall == "arc" else 1.0, steep[:-1]) / size
+    turning = sum(
+        bounds(law).curvature * (size if name in ("nu", "slope") else 1.0)
+        for name, law in laws(scene).items()
+    )
+    rounding = margin + aside * turning / pace
+    off_before = np.abs(kept) / np.append(now.r if start.wall == "arc" else 1.0, steep[:-1]) / size
     flaws = {
         "its time is not when the flight ends": np.abs(t - t0 - dt) > late / 2 + flight * np.abs(dt),
         "is off the flight before": off_flight > flight + 4 * late * speed / size,
         "is off its wall": off_wall > margin,
         "does not come from its wall's inside": away > rounding,
         "is not turned round by its wall": turn > 16 * rounding,
-        "is beyond a wall, or was on the way": beyond > margin,
+        "is beyond a wall, or was on the way": _beyond(scene, before, dt, walls, (x, y))
+        > margin + 2 * off_before,
         "comes after nothing": dt < 0,
     }
     bad = {why: int(np.argmax(where)) for why, where in flaws.items() if where.any()}
@@ -146,18 +148,10 @@ def _first_flaw(
     return f"outcome {bad[why] + 1} {why}"
 
 
-def _speed_of_walls(table: Any, size: Any) -> Any:
-    """Return a bound on how fast any place of a wall moves."""
-    return (
-        np.abs(table.r_rate) + np.abs(table.w_rate) + np.abs(table.h_rate) + np.abs(table.slope_rate) * size
-    )
-
-
-def _meet_walls(scene: Scene, before: Any, after: Any, walls: Any, moving: Any) -> tuple[Any, Any, Any, Any]:
+def _meet_walls(scene: Scene, before: Any, after: Any, walls: Any, pace: Any) -> tuple[Any, Any, Any, Any]:
     """Return f of each hit's wall, its scale, how far the bounce is off, and how fast f grows on arrival."""
     _, _, _, vx0, vy0 = before
     t, x, y, vx, vy = after
-    speed = np.hypot(vx0, vy0)
     f, steep, turn, away = 0.0 * t, 1.0 + 0.0 * t, 0.0 * t, 0.0 * t
     for wall in set(scene.walls).intersection(walls):
         k = np.flatnonzero(walls == wall)
@@ -168,8 +162,8 @@ def _meet_walls(scene: Scene, before: Any, after: Any, walls: Any, moving: Any) 
         rate, square = at.gap_rate(wall, x[k], y[k], vx0[k], vy0[k]), gx * gx + gy * gy
         kick = -2 * rate / square
         turn[k] = np.hypot(vx[k] - vx0[k] - kick * gx, vy[k] - vy0[k] - kick * gy)
-        turn[k] /= speed[k] + np.abs(kick) * np.sqrt(square) + moving[k]
-        away[k] = rate / np.sqrt(square) / (speed[k] + moving[k])
+        turn[k] /= pace[k] + np.abs(kick) * np.sqrt(square)
+        away[k] = rate / np.sqrt(square) / pace[k]
     return f, steep, turn, away
 
 

@@ -168,7 +168,7 @@ def _least(condition: Condition, start: float, span: float, n: int) -> Sequence[
     # Floats know t, and hence the phase of a wave, to some 2^-52 of it: here to 2^-30 of a turn.
     if not abs(start) + span < 2.0**18 * span:
         return range(n)
-    times = start + span * np.arange(n) / n
+    times = start + span * (np.arange(n) / n)
     sizes = (prod(max(map(abs, bounds(law)[:2])) for law in factors) for _, factors in condition.terms)
     with np.errstate(all="ignore"):
         found = sum(sign * prod(values(law, times) for law in factors) for sign, factors in condition.terms)

@@ -162,10 +162,9 @@ def _read(cmd: str, line: bytes, form: Any, *, is_checked: bool = False) -> Any:
     """
     try:
         if not is_checked:
-            if not line.isascii():
-                line.decode()
+            text = line.decode()
             with suppress(json.JSONDecodeError, RecursionError):  # no JSON: the decoder says where
-                json.loads(line, object_pairs_hook=_once, parse_int=str, parse_float=str)
+                FIELDS_ONCE.decode(text)
         return _decoded(with_minus_zeros(line), form)
     except UNREADABLE as error:
         raise _unreadable(cmd, error, line) from None
@@ -178,6 +177,9 @@ def _once(pairs: list[tuple[str, object]]) -> None:
         for name in NAMED & counts.keys():
             if counts[name] > 1:
                 raise msgspec.ValidationError(f"Field `{name}` stands twice")
+
+
+FIELDS_ONCE = json.JSONDecoder(object_pairs_hook=_once, parse_int=str, parse_float=str)
 
 
 def _decoded(line: bytes, form: Any) -> Any:

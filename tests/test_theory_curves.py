@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpmath import fp
 
-from scene import load
+from scene import Fourier, Mushroom, load
 from scene.transforms import scaled
 from theory import (
     Cycle,
@@ -41,6 +41,14 @@ def test_curve_points_satisfy_the_definitions() -> None:
         at_capture, at_release = volumes_at(fp, scene, float(t_in)), volumes_at(fp, scene, float(t_out))
         g = at_capture.v_cha / at_capture.v_cap / (at_release.v_cha / at_release.v_cap)
         assert log_g == pytest.approx(np.log(g), abs=1e-13)
+
+
+def test_times_are_resolved_where_all_else_is_smooth_in_nu() -> None:
+    """Only the mouth moves, and nearly stops where it turns."""
+    nu = Fourier(mean=0.5, omega=1.0, cos=(0.3, 0.075 * 0.999))
+    curve = capture_curve(Mushroom(r=1.0, h=1.0, nu=nu), 101)
+    np.testing.assert_allclose(nu(curve.t_in), curve.nu, rtol=1e-14)
+    np.testing.assert_allclose(nu(curve.t_out), curve.nu, rtol=1e-14)
 
 
 def test_largest_gain_of_the_moving_cap() -> None:

@@ -209,6 +209,15 @@ def test_a_figure_that_is_0_is_told_as_0():
     assert (found.log_e_nc, found.strings(6)["m1"]) == (0, "0.00360974")
 
 
+def test_walls_that_hardly_move_are_resolved_as_well_as_others():
+    """Gains are below the first target, so that its parts are too wide near where the mouth nearly turns."""
+    r = Fourier(mean=1.0, omega=1.0, sin=(1e-17,))
+    h = Fourier(mean=1.0, omega=1.0, cos=(5e-18,), sin=(0.0, -1e-17))
+    nu = Fourier(mean=0.5, omega=1.0, cos=(0.3, 0.075075), sin=(0.01,))
+    found = predict(Mushroom(r=r, h=h, nu=nu, slope=0.03)).strings(15)
+    assert (found["m1"], found["sd"]) == ("3.02583701397630e-35", "7.77925062454772e-18")
+
+
 def test_a_plateau_within_the_capture_splits_the_integrals() -> None:
     ctx = MPContext()
     ctx.dps = 25

@@ -220,7 +220,7 @@ def captures(cycle: Cycle, target: int, on_progress: Callable[[float], None] = s
 
     Args:
         cycle: the cycle.
-        target: decimals to which a, b and log g are resolved, at most digits + GUARD of the cycle.
+        target: decimals to which times, a, b and log g are resolved, at most digits + GUARD of the cycle.
         on_progress: called with the share of the work that is done, again and again.
 
     Raises:
@@ -390,10 +390,12 @@ def _sampled(
     for grid in grids:
         headway.at((descent.number + 1 - grids[0].n / grid.n) * 0.5**descent.halvings)
         samples = _with_between(samples, grid, descent)
-        _, _, _, *columns = map(list, zip(*samples, strict=True))
-        c_A, c_B, c_g = map(grid.coefficients, columns)
-        # Of a narrow mouth a and b are large, and A and B in proportion.
-        tail = max(_tail(c_g), *(_tail(c) / max(swing, *map(abs, c)) for c in (c_A, c_B)))
+        _, *columns = map(list, zip(*samples, strict=True))
+        *times, c_A, c_B, c_g = map(grid.coefficients, columns)
+        # Of a narrow mouth a and b are large, and A and B in proportion. Where only the mouth moves, times
+        # may be less smooth than these.
+        tails = [_tail(c) / max(swing, *map(abs, c)) for c in (c_A, c_B)]
+        tail = max(_tail(c_g), *tails, *(_tail(c) / max(map(abs, c)) for c in times))
         n_digits = -descent.binary.log10(tail)
         if n_digits >= target:
             return grid, descent, samples

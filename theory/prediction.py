@@ -1,8 +1,9 @@
 """What the adiabatic theory predicts for one cycle: the figures of secs. 3.5 and 4.
 
-Everything is computed at two or more resolutions, each of which has twice the points of the one before. An
-answer is given when two in a row agree to two digits more than asked, and is then the finer of the two. A
-cycle in which one particle is captured several times is covered too.
+Everything is computed at two or more resolutions. The second has twice the points of the first, the third
+smaller parts, and the fourth twice the points of the third. An answer is given when two in a row agree to
+two digits more than asked, and is then the finer of the two. A cycle in which one particle is captured
+several times is covered too.
 
 Solved cycles are kept for the next request, those of the last KEPT solutions to few digits. Their numbers
 belong to no number system, and each caller's figures to that of its own cycle: it may change that, or compute
@@ -32,6 +33,9 @@ from theory.validation import MAX_DIGITS, MAX_ORDER, one_of
 from theory.volumes import as_mushroom
 
 MOST_RESOLUTIONS = 4
+# Decimals beyond those asked to which parts are halved anew, by resolution. Figures may be small beside 1:
+# the first target then leaves parts so wide that twice their points do not do.
+TARGETS = {0: 4, 2: 28}
 KEPT = 32
 FEW_DIGITS = 60  # a solution takes about a megabyte then, and grows with the square of the digits
 
@@ -239,8 +243,8 @@ def resolutions(
         on_progress = silent if progress is None else partial(progress, number + 1)
         if number < len(kept):
             on_progress(1.0)
-        elif number == 0:
-            kept.append(captures(cycle, cycle.digits + 4, on_progress))
+        elif number in TARGETS:
+            kept.append(captures(cycle, cycle.digits + TARGETS[number], on_progress))
         else:
             kept.append(refined(kept[-1], on_progress))
         yield replace(kept[number], cycle=cycle)

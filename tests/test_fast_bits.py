@@ -14,7 +14,7 @@ from scene import Cap, State, load
 from scene.transforms import mirrored, mirrored_wall
 
 # Of `small_ensemble`. It changes when the arithmetic does, and then only on purpose.
-PINNED = "c1b1a9d9937610a9d4285761981049493d5e39a5532ab7353222f28762f68230"
+PINNED = "a7daa8f47de1d65ba14c8bca65f4078b2b377581153238642a7a85f7c63cf91b"
 
 
 def small_ensemble(threads: int | None = None) -> fast.Ensemble:

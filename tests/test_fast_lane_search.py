@@ -143,6 +143,18 @@ MUTANTS = {
         "min(v2 - bend, pushed)",
         "v2 - bend",
     ),
+    "the part of a velocity that a bounce turns": (
+        "slow beside a plateau",
+        400,
+        "(abs(vy) if hit == ON_FLOOR else abs(vx)) - limits.rate",
+        "abs(vx) + abs(vy) - limits.rate",
+    ),
+    "what a moving slope turns": (
+        "across a slope near zero",
+        100,
+        "quality = min(quality, told_slope(hit, there.m, vx, vy, limits))",
+        "pass",
+    ),
     "what a hop hangs on": (
         "early hop",
         1500,

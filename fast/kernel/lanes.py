@@ -84,6 +84,15 @@ def at_side_or_floor(hit, outset, place, stem, slope):
 
 
 @part
+def told_slope(hit, m, vx, vy, limits):
+    """Be above 0 where rounding of a moving slope turns a bounce no more than rounding of the state."""
+    steepest = limits.lean - 1.0
+    aslant = min(abs(vy) - steepest * abs(vx), abs(vx) - steepest * abs(vy))
+    told = max(abs(m) - 0.25 * steepest, aslant)
+    return told if hit >= ON_LEFT and hit != ON_FLOOR else 1.0
+
+
+@part
 def hop_along_arc(s, outset, r0, dr):
     """Return f of the arc that was left, by its increments since, of which `dr` is the radius's."""
     return fma(dr, fma(2.0, r0, dr), -s * fma(s, outset.v2, 2.0 * outset.q))
@@ -216,8 +225,10 @@ def land(a, i, table, waves, slope, degree, limits):
     first = way_out(hit, s, outset, rate, k_side, sizes, limits)
     quality = min(min(quality, place), min(first, s))
     # The arc's function must be concave, and a bounce hang on a rate no more than on what enters.
-    pushed = (abs(vx) + abs(vy)) - limits.rate if hit >= ON_LEFT else 1.0
+    pushed = (abs(vy) if hit == ON_FLOOR else abs(vx)) - limits.rate if hit >= ON_LEFT else 1.0
     quality = min(quality, min(v2 - bend, pushed))
+    if slope is None:
+        quality = min(quality, told_slope(hit, there.m, vx, vy, limits))
     # A hop needs the radius at both of its ends, and its rate as well as what enters.
     known = min(known, told_rate(r, sizes, limits))
     known = known if hit == ON_ARC else 1.0

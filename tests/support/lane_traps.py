@@ -10,7 +10,8 @@ other. As a rule rounding of the state or the time does as much. It does not whe
 when the phase itself is nearly 0, near an axis and nearly along the arc.
 
 A side or the floor hands its rate to a particle that is much slower, rounded as it is where the wall was
-quick, and where it stands nearly still for long no rounding of time or place does as much.
+quick, and where it stands nearly still for long no rounding of time or place does as much. A speed along the
+wall does not help. The same holds for a slope that moves and is nearly zero.
 
 A flight up a deep stem may be a million times as long as the cap is high: what is left of its time moves the
 place of the hit along the path, and no rounding of the start does, which moves it across.
@@ -112,8 +113,8 @@ def misled_chord(n: int, random: np.random.Generator) -> tuple[Scene, list[Start
 def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
     """Draw flights from the floor along the right side, whose w = nu r is of the fourth order at its least.
 
-    f = w - x then has the shape of any quartic. Its first roots are u_1 and u_2; u_2 is solved for such that
-    Newton's method ends there.
+    f = w - y - x then has the shape of any quartic. Its first roots are u_1 and u_2; u_2 is solved for such
+    that Newton's method ends there.
     """
     swing = float(random.uniform(0.2, 0.9))
     other = min(0.98, swing * (1.0 + random.normal() * float(10.0 ** random.uniform(-3, -1.5))))
@@ -152,9 +153,9 @@ def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]
         u_2 = zero_between(missed, first, first * random.uniform(1.0, 1.3, N_CROWD))
         v, x = motion(u_2)
         is_good = (x < w(0.0)) & (v > rate(0.0)) & (rate(u_1) < v) & (u_2 < REACH)
-    scene = Mushroom(r=r, nu=nu, h=1.0)
+    scene = Mushroom(r=r, nu=nu, h=1.0, slope=-1.0)  # it leans, so that x may change quickly along it
     starts = [
-        (np.array([t[i], 0.0, x[i], -1.0, v[i], 3.0]), int(records.FLOOR))
+        (np.array([t[i], 0.0, x[i] + 1.0, -1.0, v[i] - 3.0, 3.0]), int(records.FLOOR))
         for i in np.flatnonzero(is_good)[:n]
     ]
     return scene, starts
@@ -203,18 +204,19 @@ def up_a_deep_stem(n: int, random: np.random.Generator) -> tuple[Scene, list[Sta
 
 
 def slow_beside_a_plateau(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
-    """Draw short slow flights to a floor or a side that stands nearly still, and is quick at other times."""
+    """Draw short flights, slow towards a wall that stands nearly still, and is quick at other times."""
     law, is_floor, starts = _plateau(int(random.integers(2, 9))), random.random() < 0.5, []
     scene = Mushroom(r=3.0, w=1.0, h=law) if is_floor else Mushroom(r=3.0, w=law, h=1.0)
     for _ in range(n):
         t = float(2.0 * np.pi * random.integers(0, 5) + random.uniform(-0.4, 0.2))
-        speed, along = 10.0 ** random.uniform(-4, -1.5), random.random()
-        s = speed * 10.0 ** random.uniform(-3, -1)
+        speed, is_quick = 10.0 ** random.uniform(-4, -1.5), random.random() < 0.5
+        along = 10.0 ** random.uniform(-0.5, 0.7) if is_quick else speed * random.random()
+        s = min(speed, 0.5 / along) * 10.0 ** random.uniform(-3, -1)
         there, rate = float(value(fp, law, t + s)), float(value(fp, law, t + s, 1))
         if is_floor:
-            place, wall = (1.0, (speed + rate) * s - there, -speed * along, -speed - rate), records.RIGHT
+            place, wall = (1.0, (speed + rate) * s - there, -along, -speed - rate), records.RIGHT
         else:
-            place, wall = (there - (speed + rate) * s, -1.0, speed + rate, speed * along), records.FLOOR
+            place, wall = (there - (speed + rate) * s, -1.0, speed + rate, along), records.FLOOR
         starts.append((np.array([t, 0.0, *place]), int(wall)))
     return scene, starts
 
@@ -226,6 +228,23 @@ def _plateau(n: int) -> Fourier:
     return Fourier(1.0 + shares[0], 1.0, waves[1:])
 
 
+def across_a_slope_near_zero(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """Draw nearly level flights from the left side to the right, whose slope is only briefly small."""
+    swing, phase = 1.3, float(random.uniform(0.0, 6.0))
+    waves = (swing * np.cos(phase),), (swing * np.sin(phase),)
+    slope = Fourier(-swing - 1e-9, 1.0, *(tuple(map(float, wave)) for wave in waves))
+    scene, starts = Mushroom(r=1.0, w=0.5, h=0.02, slope=slope), []
+    for _ in range(n):
+        t = phase + float(2.0 * np.pi * random.integers(0, 2) + random.uniform(-0.06, -0.01))
+        y, m = -float(random.uniform(0.002, 0.018)), float(value(fp, slope, t))
+        vx, vy = (
+            float(random.uniform(10.0, 40.0)),
+            float(random.choice([-1, 1]) * 10.0 ** random.uniform(-4, -1)),
+        )
+        starts.append((np.array([t, 0.0, -(0.5 + m * y), y, vx, vy]), int(records.LEFT)))
+    return scene, starts
+
+
 TRAPS: dict[str, Group] = {
     "corner over a rising floor": Group(corner_over_a_rising_floor),
     "misled chord": Group(misled_chord, is_captured=True),
@@ -234,4 +253,5 @@ TRAPS: dict[str, Group] = {
     "early hop through the base": Group(early_hop, is_captured=True),
     "up a deep stem": Group(up_a_deep_stem),
     "slow beside a plateau": Group(slow_beside_a_plateau),
+    "across a slope near zero": Group(across_a_slope_near_zero),
 }

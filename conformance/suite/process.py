@@ -273,13 +273,12 @@ class Process:
             raise CheckFailure("wrong-format", f"wrote without being asked: {excerpt(self._received)}")
 
     def _advance(self, pending: bytes, timeout: float) -> bytes:
-        # One look at all pipes; returns what is still to be written.
-        is_pending = bool(pending)
-        if is_pending:
+        # Write what a pipe takes, and look at all pipes once; returns what is still to be written.
+        pending = self._write(pending) if pending else pending
+        if pending:
             self._selector.register(self._stdin, selectors.EVENT_WRITE)
         for key, _ in self._selector.select(timeout):
             if key.fileobj is self._stdin:
-                pending = self._write(pending)
                 continue
             data = key.fileobj.read(2**20)  # type: ignore[union-attr]
             if data == b"":
@@ -289,7 +288,7 @@ class Process:
                 self._is_open = data != b""
             elif data:
                 self._transcript.add(data)
-        if is_pending:
+        if pending:
             self._selector.unregister(self._stdin)
         return pending
 

@@ -85,7 +85,7 @@ def at_side_or_floor(hit, outset, place, stem, slope):
 
 @part
 def told_slope(hit, m, vx, vy, limits):
-    """Be above 0 where rounding of a moving slope turns a bounce no more than rounding of the state."""
+    """Be above 0 where rounding of a moving slope turns a bounce little more than that of the state."""
     steepest = limits.lean - 1.0
     aslant = min(abs(vy) - steepest * abs(vx), abs(vx) - steepest * abs(vy))
     told = max(abs(m) - 0.25 * steepest, aslant)

@@ -1,6 +1,7 @@
 """`python -m fast`: serve the fast stepper through protocol 1."""
 
 import math
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -19,7 +20,7 @@ FOR_EVER = 2.0**1000  # the horizon of a path that has none, once nothing is met
 def follow(scene: Scene, state: State, n_collisions: int, t_end: float = math.inf) -> list[Outcome]:
     """Return the collisions of a trajectory, the last entry may be another outcome."""
     path = fast.trajectory(scene, state, n_collisions, t_end)
-    steps = [Collision(wall, *map(float, row)) for wall, row in zip(path.walls, path.steps, strict=True)]
+    steps = [Collision(wall, *row) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)]
     return [*steps, path.outcome] if path.outcome is not None else list(steps)
 
 
@@ -52,3 +53,4 @@ def clock(scene: Scene, state: State, n_collisions: int, repeat: int) -> tuple[l
 
 if __name__ == "__main__":
     serve("fast", fast.next_collision, follow, sys.stdin.buffer, sys.stdout.buffer, flow=carry, timer=clock)
+    os._exit(0)  # at once: the compiler takes up to seconds to free its code, which the system does anyway

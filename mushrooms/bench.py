@@ -163,7 +163,8 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
 
 def prove_path(scene: Scene, state: State, n_collisions: int) -> tuple[list[PathPoint], list[Sensitivity]]:
     """Follow a path by proof, right to twenty digits at its end, and chain the Jacobians of its steps."""
-    path, links = reference.trajectory(scene, state, n_collisions, digits=20), Links(scene, state, FAR)
+    path = reference.trajectory(scene, state, n_collisions, digits=20, is_differentiated=True)
+    links = Links(state)
     chain = [Sensitivity(links.add(step), links.held[0]) for step in path.steps]
     return _places(path), chain
 

@@ -7,6 +7,7 @@ the whole trajectory begins again at twice that. What is claimed, and why it fol
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from fractions import Fraction
 
 from reference.answers import Jacobian, Outcome, ProvedCollision, Trajectory
@@ -45,7 +46,7 @@ def trajectory(
             position that may be 0 has this many digits relative to the length of the last flight.
         working: decimals to work with. The path ends with Undecided if they do not decide the next step, for
             any `digits`. By default they are doubled until they suffice.
-        is_differentiated: whether to return the Jacobian of the whole path.
+        is_differentiated: whether to return the Jacobian of the whole path, and of each step.
 
     Raises:
         BadInput: naming field, value and bound.
@@ -110,9 +111,12 @@ def _extend(
         hit = course.event()
         if not isinstance(hit, Hit):
             return horizon(course) if hit is None else hit, None
-        if matrix is not None:
-            matrix = chained(step_jacobian(course, hit), matrix)
         after = bounce(course, hit)
-        steps.append(collision(course, hit, after))
+        found = collision(course, hit, after)
+        if matrix is not None:
+            own = step_jacobian(course, hit)
+            matrix = chained(own, matrix)
+            found = replace(found, jacobian=enclosures(arithmetic, own))
+        steps.append(found)
         course = fly_on(course, hit, after)
     return None, None if matrix is None else enclosures(arithmetic, matrix)

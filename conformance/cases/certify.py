@@ -100,6 +100,11 @@ def flight_of(outcome: reference.Collision | reference.Horizon, state: State, t_
     if isinstance(outcome, reference.Horizon):
         dt = Fraction(t_end) - Fraction(state.t)
         return ProvedFlight(None, _numbers((dt, dt), outcome.at), free_flight(state, float(dt)))
+    return flight_to(outcome)
+
+
+def flight_to(outcome: reference.Collision) -> ProvedFlight:
+    """Return the flight that ends with a collision, which was asked for with its Jacobian."""
     assert outcome.jacobian is not None
     largest = max(abs(float(end)) for row in outcome.jacobian for d in row for end in d)
     jacobian = [[_steepest(d, largest) for d in row] for row in outcome.jacobian]
@@ -224,26 +229,23 @@ WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backw
 class Links:
     """The steps of a trajectory: their Jacobians chained from each state that a stepper has held.
 
-    Each Jacobian is that of the step from the rounded state, with the residual of the wall moving along.
+    Each Jacobian is that of the step from the enclosed state, with the residual of the wall moving along.
     `held` is (n, 5, 5): d(t, x, y, vx, vy) after the last step by t, x, y, vx, vy of each state held, and
     `inputs` is (n, 5). Sums go over whole arrays: four digits of the allowances are kept, which no order of
     summation changes. A flow tells no flight times: how delicate these are does not count where `is_timed`
     is false.
     """
 
-    def __init__(self, scene: Scene, state: State, t_end: float, *, is_timed: bool = True) -> None:
-        self.scene, self.state, self.t_end, self.is_timed = scene, state, t_end, is_timed
+    def __init__(self, state: State, *, is_timed: bool = True) -> None:
+        self.state, self.is_timed = state, is_timed
         self.held: npt.NDArray[np.float64] = np.empty((0, 5, 5))
         self.inputs: npt.NDArray[np.float64] = np.empty((0, 5))
         self.condition = self.largest = 0.0
 
     def add(self, found: reference.Collision) -> list[float]:
-        """Add a step, and return what all rounding may do to it: it begins at the rounded state."""
-        proved = ask(self.scene, self.state, self.t_end)
-        if not isinstance(proved, reference.Collision) or proved.wall != found.wall:
-            raise Unfit("a rounded state takes another path")
-        centre = [float(found.dt), *(float(c) for c in found.after[1:])]
-        allowance = self._chain(flight_of(proved, self.state, self.t_end).jacobian, centre)
+        """Add a step with its Jacobian, and return what all rounding may do to it."""
+        flight = flight_to(found)
+        allowance = self._chain(flight.jacobian, flight.centre())
         self.state = found.rounded().state()
         return allowance
 
@@ -294,14 +296,16 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     assert question.collisions is not None
     state, t_end = question.state, question.t_end
     try:
-        path = reference.trajectory(scene, state, question.collisions, t_end, working=working)
+        path = reference.trajectory(
+            scene, state, question.collisions, t_end, working=working, is_differentiated=True
+        )
         captured = marks(scene, path.steps) if question.is_flow else []
     except InvalidState as error:
         raise Unfit(str(error)) from None
     end = path.outcome
     if question.is_flow and not isinstance(end, reference.Horizon):
         raise Unfit("no flow to the horizon")
-    links = Links(scene, state, t_end, is_timed=not question.is_flow)
+    links = Links(state, is_timed=not question.is_flow)
     steps = _steps(links, path, question)
     if len(steps) < len(path.steps):
         end = None

@@ -367,14 +367,15 @@ def _measure(
             # An exact zero that nothing can move, as y on the base, has no size of its own to be measured by.
             is_zero = not allowances[name] and not any(truth[name])
             size = scale if is_zero else sizes[name]
-            is_named = found.most <= physics and most / scale > found.most
+            off = most / scale
+            is_named = found.most <= physics and off > found.most
             found = _Measured(
                 max(found.least, least / scale),
-                max(found.most, most / scale),
+                max(found.most, off),
                 max(found.least_ulps, backward_ulps(least, size)),
                 max(found.most_ulps, backward_ulps(most, size)),
                 place + name if is_named else found.where,
-                most / scale if is_named else found.off,
+                off if is_named else found.off,
             )
     return found
 

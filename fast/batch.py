@@ -14,17 +14,18 @@ import numpy as np
 import numpy.typing as npt
 
 from fast.flows import carry
-from fast.kernel import pools, records
+from fast.kernel import records
 from fast.kernel.compiling import kept
 from fast.kernel.follow import advance
 from fast.kernel.lane_laws import know_laws, set_reference
 from fast.kernel.laws import set_anchors
-from fast.kernel.pools import COARSE, FAR, MARKED, MAX_CORRECTIONS, MOVED, copy_rows, load, whole_registers
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, HORIZON, Compiled, FloatArray, IntArray, Particle, Paths, particle_at, unfilled_ends,
-    unfilled_paths, write_state, write_step,
+    ANCHORS_SHAPE, COARSE, FAR, HORIZON, MARKED, MAX_CORRECTIONS, MOVED, Compiled, FloatArray, IntArray,
+    Particle, Paths, copy_rows, load, particle_at, unfilled_ends, unfilled_paths, whole_registers,
+    write_state, write_step,
 )  # fmt: skip
+
 from fast.kernel.scalar_step import KNOWN
 from fast.kernel.walls import wall_residual
 from fast.kernel.worker import DISK, GENERAL, careful_at, new_worker, run_careful
@@ -35,7 +36,7 @@ from fast.step import WALL_NAMES, as_arrays, end_of_path, fitted_start
 from fast.units import compile_scene, fit, outward
 from scene import Collision, Outcome, Scene, State
 
-PLACE = (pools.X, pools.Y, pools.VX, pools.VY)
+PLACE = (records.X, records.Y, records.VX, records.VY)
 
 
 @kept(error_model="numpy")
@@ -44,10 +45,10 @@ def fill_lane(a, i, particle, age, worker):
     for early in (age, 0.0):
         load(a, i, particle, False)
         know_laws(a, i, early, worker.scene, worker.pieces, worker.degree, worker.waves)
-        if a[pools.END + i] > particle.t:
+        if a[records.END + i] > particle.t:
             break
-    a[pools.AS_GIVEN + i], a[pools.STOP + i] = 0.0, np.inf
-    a[pools.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
+    a[records.AS_GIVEN + i], a[records.STOP + i] = 0.0, np.inf
+    a[records.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
 
 
 @kept(error_model="numpy")
@@ -55,17 +56,17 @@ def step_lanes(pool, a, n, worker, spare):
     """Take a step of n lanes where it is shown right, corrected as often as need be in a pool of one lane."""
     advance(pool, a, whole_registers(n), worker)
     for i in range(n):
-        copy_rows(a, i, spare, 0, pools.T, pools.POOL_SIZE)
-        while spare[pools.FATE] in (COARSE, FAR):
-            if spare[pools.FATE] == FAR:
-                if spare[pools.TRIES] > MAX_CORRECTIONS:
+        copy_rows(a, i, spare, 0, records.T, records.POOL_SIZE)
+        while spare[records.FATE] in (COARSE, FAR):
+            if spare[records.FATE] == FAR:
+                if spare[records.TRIES] > MAX_CORRECTIONS:
                     break
-                t = spare[pools.T] + spare[pools.S]
-                set_reference(spare, 0, t, spare[pools.T_LOW], worker.scene, worker.pieces, worker.degree)
-            if spare[pools.END] == -np.inf:
+                t = spare[records.T] + spare[records.S]
+                set_reference(spare, 0, t, spare[records.T_LOW], worker.scene, worker.pieces, worker.degree)
+            if spare[records.END] == -np.inf:
                 break
             advance(pool, spare, 1, worker)
-        copy_rows(spare, 0, a, i, pools.T, pools.POOL_SIZE)
+        copy_rows(spare, 0, a, i, records.T, records.POOL_SIZE)
 
 
 @kept(error_model="numpy")
@@ -171,7 +172,7 @@ class LaneRound:
         self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6)), 1, (1, 1)))
         self.serves = float(np.diff(self.in_lanes.pieces.begins, append=self.in_lanes.pieces.period).max())
         self.anchors = np.zeros(ANCHORS_SHAPE)
-        self.pool, self.spare = np.zeros(pools.POOL_SIZE), np.zeros(pools.POOL_SIZE)
+        self.pool, self.spare = np.zeros(records.POOL_SIZE), np.zeros(records.POOL_SIZE)
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
@@ -187,9 +188,9 @@ class LaneRound:
     def step(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
         self.advance(n)
-        rows = np.column_stack([self.row(r, n) for r in (pools.S, *PLACE)])
-        fates = self.row(pools.FATE, n)
-        return (fates == MARKED) | (fates == MOVED), self.row(pools.HIT, n).copy(), rows
+        rows = np.column_stack([self.row(r, n) for r in (records.S, *PLACE)])
+        fates = self.row(records.FATE, n)
+        return (fates == MARKED) | (fates == MOVED), self.row(records.HIT, n).copy(), rows
 
     def advance(self, n: int) -> None:
         """Take a step in n lanes."""
@@ -214,8 +215,8 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
     """
     pool = LaneRound(fit(scene).scene)
     found: list[Outcome | None] = []
-    for first in range(0, len(states), pools.LANES):
-        part = states[first : first + pools.LANES]
+    for first in range(0, len(states), records.LANES):
+        part = states[first : first + records.LANES]
         starts, are_met = [fitted_start(scene, state) for state in part], []
         for i, (p, wall) in enumerate(zip(*as_arrays(starts), strict=True)):
             pool.fill(i, p, wall)

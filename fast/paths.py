@@ -1,7 +1,7 @@
 """Paths of one particle from collision to collision: in binary64, to 31 decimals, or until an event.
 
 A trajectory carries its time as a sum of two floats, and takes the steps of the lanes where they are shown
-right (fast.kernel.one_path). A fine trajectory carries all its numbers so (fast.kernel.fine_step). Events are
+right (fast.kernel.follow). A fine trajectory carries all its numbers so (fast.kernel.fine_step). Events are
 sought among the collisions of a trajectory: the arc hit with which a capture interval begins, the hit with
 which it ends, or the hit after which an energy is reached.
 """
@@ -19,7 +19,7 @@ from mpmath import fp
 
 from fast.kernel import records
 from fast.kernel.fine_step import fine_path
-from fast.kernel.one_path import PATHS
+from fast.kernel.follow import PATHS
 from fast.kernel.records import ANCHORS_SHAPE, FloatArray, IntArray, unfilled_ends, unfilled_paths
 from fast.kernel.single import ANSWER_LOST
 from fast.kernel.worker import Loops, careful_at, new_worker

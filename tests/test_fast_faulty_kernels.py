@@ -24,7 +24,7 @@ FAULTS = {
     ),
     "a start below y = 0 is taken to be on the arc": (
         *ELSEWHERE,
-        *("pools.py", "if a[Y + i] < 0.0 and a[WALL + i] == ON_ARC:", "if a[Y + i] < 0.0:"),
+        *("records.py", "if a[Y + i] < 0.0 and a[WALL + i] == ON_ARC:", "if a[Y + i] < 0.0:"),
     ),
     "a start in the disk is taken to be on the arc": (
         *ELSEWHERE,

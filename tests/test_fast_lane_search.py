@@ -18,7 +18,7 @@ from support.lane_search import ANYWHERE, GROUPS, Round, search
 import fast
 import reference
 from fast.batch import LaneRound, lane_steps
-from fast.kernel import lanes, pools
+from fast.kernel import lanes, records
 from fast.step import WALL_NAMES
 from scene import Cap, Collision, Mushroom, Rejected, State
 
@@ -79,7 +79,7 @@ def test_a_start_by_decree_is_left_to_the_careful_step():
 
 # A guess to third order is hardly ever misled. The checks that an arc is concave must not depend on that.
 POORER_GUESS = "return fma(r1, r2, r0 * r3 * (1.0 / 3.0))", "return 0.0"
-# What is taken out of aiming.py or lanes.py, and the group of draws and number of answers that miss it.
+# What is taken out of lanes.py, and the group of draws and number of answers that miss it.
 MUTANTS = {
     "the mouth's own curvature": (
         "side to arc",
@@ -224,7 +224,7 @@ def test_uncompiled_lanes_give_the_bits_of_compiled_ones(group):
     """Mutants run uncompiled; what is not spoilt in them is what users run."""
     random, aim = np.random.default_rng(7), GROUPS[group]
     for _ in range(4):
-        scene, starts = aim.draw(pools.LANES, random)
+        scene, starts = aim.draw(records.LANES, random)
         one, other = (Round(scene, k, is_captured=aim.is_captured) for k in (lanes, faulty_lanes("", "")))
         one.fill_all(starts)
         other.fill_all(starts)
@@ -255,7 +255,7 @@ def count_wrong_walls(draw, kernels, n_scenes, tally):
     """Count the lane answers near a corner that name another wall than the one that is proved to be first."""
     random = np.random.default_rng(5)
     for _ in range(n_scenes):
-        scene, starts = CORNERS[draw](pools.LANES, random)
+        scene, starts = CORNERS[draw](records.LANES, random)
         pool = Round(scene, kernels)
         pool.fill_all(starts)
         right, hits, rows = pool.step(len(starts))

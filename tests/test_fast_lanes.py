@@ -21,8 +21,7 @@ from fast.kernel import worker
 from fast.kernel.compiling import HOW, TOOLS
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
-from fast.kernel.pools import LANES, POOL_SIZE
-from fast.kernel.records import TableOfLanes
+from fast.kernel.records import LANES, POOL_SIZE, TableOfLanes
 from fast.kernel.worker import CACHE_LINE, LawLimits, new_pools
 from fast.pieces import PARABOLA, SERIES
 from fast.starts import initial_states

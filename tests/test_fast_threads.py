@@ -11,7 +11,7 @@ import pytest
 
 import fast
 from fast import ensemble, paths
-from fast.kernel.one_path import PATHS
+from fast.kernel.follow import PATHS
 from fast.threads import LONG, follow_path
 from scene import State, load
 

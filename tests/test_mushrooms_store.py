@@ -22,7 +22,7 @@ import fast
 import mushrooms
 from conformance.files import sealed, unsealed
 from fast.kernel import follow as kernel
-from fast.kernel import pools
+from fast.kernel import records
 from mushrooms import simulate
 from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct
@@ -467,7 +467,7 @@ def test_what_is_kept_takes_the_room_that_the_page_says():
 
 
 def forgotten(row):
-    column = kernel.FIRST_ROW + int(row // pools.STRIDE)
+    column = kernel.FIRST_ROW + int(row // records.STRIDE)
 
     def faulty(arrays, *more):
         lanes = arrays[LANES].copy()
@@ -481,7 +481,7 @@ def of_others(arrays, *more):
     return paused_of({**arrays, LANES: arrays[LANES][::-1]}, *more)
 
 
-@pytest.mark.parametrize("faulty", [forgotten(pools.VX), forgotten(pools.PHASE_SINE), of_others])
+@pytest.mark.parametrize("faulty", [forgotten(records.VX), forgotten(records.PHASE_SINE), of_others])
 def test_a_run_that_would_go_on_otherwise_does_not(command_line, tmp_path, monkeypatch, faulty):
     """The first particles are followed both ways before a block is touched."""
     summary_of(command_line(*lengthened(tmp_path, 1)))

@@ -25,13 +25,11 @@ from fast.kernel.arithmetic import (  # isort: skip
 from fast.kernel.compiling import kept, kernel, packed, part
 from fast.kernel.laws import bend_of_half_leg, set_anchors, whole_periods
 
-from fast.kernel.pools import (  # isort: skip
-    AHEAD, BACK, BEFORE, DEPTH_LAW, END, LAWS, LIMIT, MEAN_RATE, NEVER, N_COEFFICIENTS, PHASE_COSINE,
-    PHASE_SINE, PIECE, R0, RADIUS_LAW, REF, REF_LOW, SLOPE_LAW, STRIDE, T, T_LOW, WIDTH_LAW,
-)  # fmt: skip
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, ANCHORS_SHAPE, BANG_BANG, CONSTANT, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, KIND,
-    N_HARMONICS, OMEGA, PHASE, RADIUS, RATE, SINE, SINE_LOW, SLOPE, VALUE, VALUE_LOW, WIDTH, LaneWaves,
+    AHEAD, AMPLITUDES, ANCHORS_SHAPE, BACK, BANG_BANG, BEFORE, CONSTANT, COSINE, COSINE_LOW, DEPTH,
+    DEPTH_LAW, END, FOURIER, HALF_LEG, KIND, LAWS, LIMIT, MEAN_RATE, NEVER, N_COEFFICIENTS, N_HARMONICS,
+    OMEGA, PHASE, PHASE_COSINE, PHASE_SINE, PIECE, R0, RADIUS, RADIUS_LAW, RATE, REF, REF_LOW, SINE,
+    SINE_LOW, SLOPE, SLOPE_LAW, STRIDE, T, T_LOW, VALUE, VALUE_LOW, WIDTH, WIDTH_LAW, LaneWaves,
 )  # fmt: skip
 
 PARABOLA, SERIES = DEGREES = 2, 12  # with the latter a harmonic takes 27 pieces

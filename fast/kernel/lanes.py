@@ -1,9 +1,11 @@
 """Many particles in lock step: each loop below is branch-free, and the compiler vectorises it.
 
-Idea. Particles sit side by side in lanes. `aim` (fast.kernel.aiming) picks every lane's wall and guesses the
-time; `fly` corrects that once, and checks; `bounce` (fast.kernel.bounces) reflects. `chord` and `rebound` do
-the same for captured particles, unfolded through the base. A lane whose step is not shown right by the checks
-is left to the careful step (fast.kernel.follow).
+Idea. Particles sit side by side in lanes. `aim` picks every lane's wall and guesses the time: walls move on
+at their speed now, and the quotients of their distances and closing speeds are compared by
+cross-multiplication; the arc is taken to second order, and what is beyond that once more at the end. `land`
+corrects the time once, checks the step, and bounces the particle. `chord` does the same for captured
+particles, unfolded through the base. A lane whose step is not shown right by the checks is left to the scalar
+step (fast.kernel.follow).
 
 Laws. A lane knows them in one of two forms: fast.kernel.lane_laws. A slope that stands still is passed as
 `slope`; where that is None the slope moves, and its rows are read.
@@ -18,15 +20,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from fast.kernel.aiming import aim, cube_of_arc, outset_of, side_curvature, side_rate
-from fast.kernel.arithmetic import SAFETY, fma, short_sum, two_product, two_sum
-from fast.kernel.bounces import (
-    ONE,
-    count_hit,
-    off_the_arc_spinning,
-    off_the_wall,
-    stay_after,
-)
+import numpy as np
+
+from fast.kernel.arithmetic import SAFETY, dot, fma, short_sum, two_product, two_sum
 from fast.kernel.compiling import packed, part, widest_registers
 from fast.kernel.lane_laws import (
     LawsAt,
@@ -37,12 +33,256 @@ from fast.kernel.lane_laws import (
     room_ahead,
 )
 
-from fast.kernel.pools import (  # isort: skip
-    AHEAD, COARSE, END, FAR, FATE, HIT, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, ON_ARC,
-    ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, REFUSED, S, SPIN, STAY, STOP, SURE, T, TRIES, T_LOW, VX, VY,
-    WALL, WHEN, X, Y,
+from fast.kernel.records import (  # isort: skip
+    AHEAD, CAPTURED, CLEARLY, COARSE, END, FAR, FATE, HIT, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER,
+    NOT_YET, N_ARC, N_BASE, N_FLOOR, N_LEFT, N_RIGHT, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, OVER,
+    R0, REFUSED, S, SPIN, STAY, STOP, SURE, T, TRIES, T_LOW, VX, VY, WALL, WHEN, X, Y, Place,
 )  # fmt: skip
-from fast.kernel.records import Place
+
+ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
+CLEARLY_BEYOND = 1.05 * 1.05  # (L / (w v))^2 from which a particle moves to the disk's pool
+
+
+class Outset(NamedTuple):
+    """A lane's particle as it leaves a wall: place, velocity v, the wall's code, x vx + y vy, and v^2."""
+
+    x: float
+    y: float
+    vx: float
+    vy: float
+    wall: float
+    q: float
+    v2: float
+
+
+@packed
+def outset_of(a, i):
+    """Return the particle of a lane."""
+    x, y, vx, vy = a[X + i], a[Y + i], a[VX + i], a[VY + i]
+    return Outset(x, y, vx, vy, a[WALL + i], fma(x, vx, y * vy), fma(vx, vx, vy * vy))
+
+
+@part
+def side_curvature(vy, slope, limits):
+    """Return a bound on |f''| of a side, w'' + m'' y + 2 m' vy, for a flight of the stem."""
+    return fma(limits.turning, abs(vy), limits.curvature) if slope is None else limits.curvature
+
+
+@part
+def side_rate(y, now, slope):
+    """Return how fast a side moves out at a height."""
+    return fma(now.m1, y, now.w1) if slope is None else now.w1
+
+
+@part
+def side_bend(y, vy, now, slope):
+    """Return f'' of a side along a flight."""
+    return fma(now.m2, y, fma(2.0 * now.m1, vy, now.w2)) if slope is None else now.w2
+
+
+@part
+def mouth_crossing(outset, w0, w1, k, limits):
+    """Return `gap` and `doubt` of docs/lanes.md: on which side of the mouth's edge y = 0 is crossed.
+
+    The gap comes times |vy|, the doubt times |vy|^2.
+    """
+    (x, y, vx, vy, _, _, _), rate_w, size = outset, limits.rate, limits.size
+    depth, rise = abs(y), abs(vy)
+    gap = fma(w0, rise, w1 * depth) - abs(fma(x, vy, -y * vx))
+    doubt = k * depth * depth
+    doubt = fma(SAFETY * rise, fma(size + abs(x), rise, (abs(vx) + rate_w) * depth), doubt)
+    return gap, doubt
+
+
+@part
+def nearest_below(wall, f_r, d_r, f_l, d_l, f_f, d_f):
+    """Return the least quotient f / d of right, left and floor, by cross-multiplication, and its wall.
+
+    f is the wall's function, 0 on the wall being left, and d how fast it falls.
+    """
+    f_r = 0.0 if wall == ON_RIGHT else f_r
+    f_l = 0.0 if wall == ON_LEFT else f_l
+    f_f = 0.0 if wall == ON_FLOOR else f_f
+    f = f_r if f_r > 0.0 else 1.0
+    d = d_r if f_r > 0.0 else 0.0
+    d = d if d > 0.0 else 0.0
+    side = ON_RIGHT
+    best_l = fma(d_l, f, -f_l * d)
+    best_l = best_l if f_l > 0.0 else 0.0
+    f = f_l if best_l > 0.0 else f
+    d = d_l if best_l > 0.0 else d
+    side = ON_LEFT if best_l > 0.0 else side
+    best_f = fma(d_f, f, -f_f * d)
+    best_f = best_f if f_f > 0.0 else 0.0
+    f = f_f if best_f > 0.0 else f
+    d = d_f if best_f > 0.0 else d
+    side = ON_FLOOR if best_f > 0.0 else side
+    return f, d, side
+
+
+@part
+def arc_quotient(outset, r0, r1, r2):
+    """Return the time to the arc, to second order in it, as a quotient f / d.
+
+    And half of how fast f falls there.
+    """
+    x, y, _, _, wall, q, v2 = outset
+    c = fma(-x, x, (r0 - y) * (r0 + y))
+    c = 0.0 if wall == ON_ARC else c
+    a2 = v2 - fma(r1, r1, r0 * r2)
+    b = fma(-r0, r1, q)
+    root = np.sqrt(fma(b, b, a2 * c))
+    return c if b > 0.0 else root - b, b + root if b > 0.0 else a2, root
+
+
+@part
+def cube_of_arc(r0, r1, r2, r3):
+    """Return the coefficient of the third power of the time in r^2."""
+    return fma(r1, r2, r0 * r3 * (1.0 / 3.0))
+
+
+@packed
+def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
+    """Choose a lane's wall and guess the time, walls moving at their speed now; returns the time.
+
+    SURE is positive only where the part of the flight before y = 0 is as chosen: docs/lanes.md.
+    """
+    outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, degree)
+    x, y, vx, vy, wall, _, _ = outset
+    depth, rise = abs(y), abs(vy)
+    is_in_cap = 1.0 if wall < 1.5 else 0.0
+    is_in_cap = 0.0 if is_stem else is_in_cap
+    k_side = side_curvature(vy, slope, limits)
+    k = k_side if is_in_cap > 0.5 else k_side + limits.lift
+    gap, doubt = mouth_crossing(outset, now.w, now.w1, k, limits)
+    edge, drift = fma(now.m, y, now.w), fma(now.m, vy, side_rate(y, now, slope))
+    f, d, side = nearest_below(wall, edge - x, vx - drift, edge + x, -vx - drift, y + now.h, -vy - now.h1)
+    f_a, d_a, root = arc_quotient(outset, now.r, now.r1, now.r2)
+    # Which of them, by the part of the table the flight is in and whether it crosses y = 0 before.
+    reaches = fma(y, d_a, vy * f_a) if vy < 0.0 else 1.0  # cap: > 0 where the arc comes first
+    stays = fma(depth, d, -f * vy) if vy > 0.0 else 1.0  # stem: > 0 where a side comes first
+    top = ON_BASE if is_stem else ON_ARC
+    below = side if gap > 0.0 else ON_BASE
+    from_cap = ON_ARC if reaches > 0.0 else below
+    from_stem = side if stays > 0.0 else top
+    hit = from_cap if is_in_cap > 0.5 else from_stem
+    f = f_a if hit == ON_ARC else f
+    d = d_a if hit == ON_ARC else d
+    f = depth if hit == ON_BASE else f
+    d = rise if hit == ON_BASE else d
+    # One division for 1 / d and 1 / root.
+    root = root if hit == ON_ARC else 1.0
+    inverse = ONE / (d * root)
+    s = f * (root * inverse)
+    # What is beyond the straight line, or beyond second order at the arc.
+    beyond = now.h2 if hit == ON_FLOOR else side_bend(y, vy, now, slope)
+    beyond = beyond if hit >= ON_LEFT else 0.0
+    beyond = beyond * s if hit != ON_ARC else cube_of_arc(now.r, now.r1, now.r2, now.r3) * s * s * d
+    s = s * fma(0.5 * beyond, inverse, 1.0)
+    # Comparisons so put that what is no number is never sure.
+    whole = reaches if is_in_cap > 0.5 else stays
+    gap = gap * rise
+    sure = abs(gap) - doubt if is_in_cap > 0.5 else gap - doubt
+    sure = 1.0 if is_stem else sure
+    sure = 1.0 if whole > 0.0 else sure
+    s = a[S + i] if a[TRIES + i] > 0.0 else s
+    a[HIT + i], a[S + i], a[SURE + i] = hit, s, sure
+    return s
+
+
+@packed
+def out_of_arc(place, vx, vy, r, rate):
+    """Return r r' - (x vx + y vy) and x^2 + y^2 at a place on the arc, each as a sum of two floats.
+
+    The low parts matter: without them the velocity after a bounce is off by four units in its last place.
+    """
+    x, x_low, y, y_low = place
+    p, push = y * vy, r * rate
+    q = fma(x, vx, p)
+    out, low = short_sum(-q, push)
+    low += fma(r, rate, -push) - (fma(y, vy, -p) + fma(x_low, vx, y_low * vy))
+    large, small = max(abs(x), abs(y)), min(abs(x), abs(y))
+    square = large * large
+    rho2 = fma(small, small, square)
+    rho2_low = fma(small, small, square - rho2) + fma(large, large, -square)
+    return out, low, rho2, fma(2.0, fma(x, x_low, y * y_low), rho2_low)
+
+
+@packed
+def divided(a, low, b, b_low, inverse):
+    """Return (a + low) / (b + b_low) as a sum of two floats, `inverse` being 1 / b."""
+    quotient = a * inverse
+    return quotient, (fma(-quotient, b, a) + fma(-quotient, b_low, low)) * inverse
+
+
+@packed
+def off_the_arc(place, vx, vy, r, rate):
+    """Return the velocity after a hit on the arc: v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - r') n."""
+    out, low, rho2, rho2_low = out_of_arc(place, vx, vy, r, rate)
+    push, low = divided(2.0 * out, 2.0 * low, rho2, rho2_low, ONE / rho2)
+    x, x_low, y, y_low = place
+    return fma(push, x, vx) + fma(push, x_low, low * x), fma(push, y, vy) + fma(push, y_low, low * y)
+
+
+@packed
+def off_the_arc_spinning(place, vx, vy, r, rate, spin):
+    """Return the velocity after a hit on the arc where the angular momentum is known to be `spin`."""
+    x, x_low, y, y_low = place
+    # Twice r r' less the velocity out goes out.
+    out, low, rho2, rho2_low = out_of_arc(place, vx, vy, 2.0 * r, rate)
+    inverse = ONE / rho2
+    a, b = dot(out, x, -spin, y), dot(out, y, spin, x)
+    a_low = fma(low, x, fma(out, x_low, -spin * y_low))
+    b_low = fma(low, y, fma(out, y_low, spin * x_low))
+    a, a_low = divided(a, a_low, rho2, rho2_low, inverse)
+    b, b_low = divided(b, b_low, rho2, rho2_low, inverse)
+    return a + a_low, b + b_low
+
+
+@packed
+def off_the_side(sign, vx, vy, m, rate):
+    """Return the velocity after a hit on a side of slope m moving out at a rate; sign is 1 on the right."""
+    inverse = 2.0 / fma(m, m, 1.0)
+    tilt, out = 0.5 * inverse * (m - 1.0) * (m + 1.0), sign * vx
+    return sign * fma(tilt, out, inverse * fma(m, vy, rate)), fma(inverse * m, out - rate, -tilt * vy)
+
+
+@packed
+def off_the_wall(hit, place, vx, vy, at_hit, slope):
+    """Return the velocity after a hit, v - 2 f' grad f / |grad f|^2, by the laws at the hit."""
+    off_x, off_y = off_the_arc(place, vx, vy, at_hit.r, at_hit.r1)
+    m, rate = (at_hit.m, fma(at_hit.m1, place.y, at_hit.w1)) if slope is None else (slope, at_hit.w1)
+    vx_s, vy_s = off_the_side(1.0 if hit == ON_RIGHT else -1.0, vx, vy, m, rate)
+    vx_s = vx if hit == ON_FLOOR else vx_s
+    vy_s = -vy - 2.0 * at_hit.h1 if hit == ON_FLOOR else vy_s
+    vx_s = vx if hit == ON_BASE else vx_s
+    vy_s = -vy if hit == ON_BASE else vy_s
+    return off_x if hit == ON_ARC else vx_s, off_y if hit == ON_ARC else vy_s
+
+
+@packed
+def stay_after(stay, hit, place, v, w):
+    """Return whether a particle is captured after a hit, from whether it was, and v before the bounce.
+
+    It is at a hit of the arc with |sin phi| > nu (eq. sinphi), |L| > w v, and until the next of the arc.
+    """
+    vx, vy, v2 = v
+    spin, edge = fma(place.x, vy, -place.y * vx), w * w * v2
+    at_arc = min(stay, OVER)
+    at_arc = CAPTURED if spin * spin > edge else at_arc
+    at_arc = CLEARLY if spin * spin > CLEARLY_BEYOND * edge else at_arc
+    after = at_arc if hit == ON_ARC else stay
+    return NOT_YET if hit >= ON_LEFT else after
+
+
+@packed
+def count_hit(a, i, hit):
+    """Count a hit of a wall."""
+    a[N_ARC + i] += 1.0 if hit == ON_ARC else 0.0
+    a[N_BASE + i] += 1.0 if hit == ON_BASE else 0.0
+    a[N_LEFT + i] += 1.0 if hit == ON_LEFT else 0.0
+    a[N_RIGHT + i] += 1.0 if hit == ON_RIGHT else 0.0
+    a[N_FLOOR + i] += 1.0 if hit == ON_FLOOR else 0.0
 
 
 @packed

@@ -22,12 +22,13 @@ from fast.kernel.arithmetic import SAFETY
 from fast.kernel.compiling import HOW, caller, kept, widest_registers
 from fast.kernel.lane_laws import DEGREES, NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
-from fast.kernel.pools import LANES, POOL_SIZE
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, BEND, CAP, DEPTH, FASTEST, HIGHEST, LOWEST, MUSHROOM, RADIUS, SLOPE, STEM, WIDTH,
-    Compiled, FloatArray, Followed, IntArray, LaneWaves, LawsInLanes, Particle, Pieces, Stops, TableOfLanes,
+    ANCHORS_SHAPE, BEND, CAP, DEPTH, FASTEST, HIGHEST, LANES, LOWEST, MUSHROOM, POOL_SIZE, RADIUS, SLOPE,
+    STEM, WIDTH, Compiled, FloatArray, Followed, IntArray, LaneWaves, LawsInLanes, Particle, Pieces, Stops,
+    TableOfLanes,
 )  # fmt: skip
+
 from fast.kernel.scalar_step import scalar_step
 
 LEAST_DEPTH = 2.0**-500  # where a bound says no more than that the depth is positive

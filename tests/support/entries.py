@@ -5,12 +5,9 @@ from __future__ import annotations
 from numba.core.dispatcher import Dispatcher
 
 from fast import batch
+from fast.kernel import arithmetic, fine_step, follow, lane_laws, scalar_step, single, worker
 
-from fast.kernel import (  # isort: skip
-    arithmetic, fine_step, follow, lane_laws, one_path, scalar_step, single, worker,
-)  # fmt: skip
-
-MODULES = (arithmetic, batch, fine_step, follow, lane_laws, one_path, scalar_step, single, worker)
+MODULES = (arithmetic, batch, fine_step, follow, lane_laws, scalar_step, single, worker)
 
 
 def kept_entries() -> list[Dispatcher]:

@@ -15,7 +15,7 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 import fast
-from fast.kernel import bounces, lane_laws, pools
+from fast.kernel import lane_laws, records
 from fast.kernel.arithmetic import fma
 from support.from_python import from_python
 
@@ -55,19 +55,16 @@ def faulty_lanes(*changes: str) -> ModuleType:
     they call that takes no pool is compiled, once for all faults.
     """
     folder = HOUSE / "fast" / "kernel"
-    sources = {
-        name: (folder / name).read_text("utf-8")
-        for name in ("lanes.py", "aiming.py", "bounces.py", "lane_laws.py")
-    }
+    sources = {name: (folder / name).read_text("utf-8") for name in ("lanes.py", "lane_laws.py")}
     for old, new in zip(changes[::2], changes[1::2], strict=True):
         assert any(old in source for source in sources.values()), old
         sources = {name: source.replace(old, new) for name, source in sources.items()}
     module = ModuleType("faulty_lanes")
     for name, source in sources.items():  # the last one's functions replace those that the first imports
         exec(compile(source, name, "exec"), module.__dict__)
-    for name, found in vars(pools).items():
+    for name, found in vars(records).items():
         vars(module).setdefault(name, found)
-    names = [each.__name__ for each in (module, bounces, lane_laws, pools)]
+    names = [each.__name__ for each in (module, lane_laws, records)]
     for name, found in list(vars(module).items()):
         function = found.py_func if isinstance(found, Dispatcher) else found
         place = getattr(function, "__module__", None)

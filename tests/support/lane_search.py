@@ -15,7 +15,7 @@ from types import ModuleType
 import numpy as np
 
 from fast.batch import LaneRound, as_particle, residual, take_careful_steps
-from fast.kernel import lanes, pools, records
+from fast.kernel import lanes, records
 from fast.kernel.fine_step import fine_path
 from fast.kernel.records import DEPTH, RATE, FloatArray
 from scene import Scene
@@ -55,8 +55,8 @@ class Round(LaneRound):
         """Take a step in n lanes; faulty kernels run uncompiled, on a list."""
         if self.is_disk:
             # A step is judged from its state alone, not from the angular momentum of the interval so far.
-            x, y, vx, vy = (self.row(r, n) for r in (pools.X, pools.Y, pools.VX, pools.VY))
-            self.row(pools.SPIN, n)[:] = x * vy - y * vx
+            x, y, vx, vy = (self.row(r, n) for r in (records.X, records.Y, records.VX, records.VY))
+            self.row(records.SPIN, n)[:] = x * vy - y * vx
         if self.kernels is lanes:
             super().advance(n)
             return
@@ -77,14 +77,17 @@ class Round(LaneRound):
     def correct_lane(self, a: list[float], i: int) -> None:
         """Correct a step that is not yet right again, as the next rounds do."""
         k, known = self.kernels, (self.compiled, self.in_lanes.pieces, self.in_lanes.degree)
-        spare = [0.0] * pools.POOL_SIZE
-        k.copy_rows(a, i, spare, 0, 0, pools.POOL_SIZE)
-        while spare[pools.FATE] in (pools.COARSE, pools.FAR) and spare[pools.TRIES] <= pools.MAX_CORRECTIONS:
-            if spare[pools.FATE] == pools.FAR:
-                t = spare[pools.T] + spare[pools.S]
-                k.set_reference(spare, 0, t, spare[pools.T_LOW], *known)
+        spare = [0.0] * records.POOL_SIZE
+        k.copy_rows(a, i, spare, 0, 0, records.POOL_SIZE)
+        while (
+            spare[records.FATE] in (records.COARSE, records.FAR)
+            and spare[records.TRIES] <= records.MAX_CORRECTIONS
+        ):
+            if spare[records.FATE] == records.FAR:
+                t = spare[records.T] + spare[records.S]
+                k.set_reference(spare, 0, t, spare[records.T_LOW], *known)
             self.call_loop(spare, 1)
-        k.copy_rows(spare, 0, a, i, 0, pools.POOL_SIZE)
+        k.copy_rows(spare, 0, a, i, 0, records.POOL_SIZE)
 
     def careful_step(self, p: FloatArray, wall: int) -> tuple[int, float, FloatArray]:
         """Return the scalar step's wall, its time, and the state after, from a state and its wall."""
@@ -171,7 +174,7 @@ def search(
     for _ in range(n // ANSWERS_OF_A_DRAW):
         if tally["lane answers"] >= most or (found and kernels is not lanes):
             break
-        scene, starts = group.draw(pools.LANES, random)
+        scene, starts = group.draw(records.LANES, random)
         found += try_starts(
             Round(scene, kernels, is_captured=group.is_captured), scene, starts, random, tally
         )
@@ -236,5 +239,5 @@ def error_of(
 
 def state_in(pool: Round, i: int) -> tuple[FloatArray, int]:
     """Return the state in a lane, as the kernels take it."""
-    rows = (pools.T, pools.T_LOW, pools.X, pools.Y, pools.VX, pools.VY)
-    return np.array([pool.pool[row + i] for row in rows]), int(pool.pool[pools.WALL + i])
+    rows = (records.T, records.T_LOW, records.X, records.Y, records.VX, records.VY)
+    return np.array([pool.pool[row + i] for row in rows]), int(pool.pool[records.WALL + i])

@@ -10,8 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fast.ensemble import Ensemble, Paused, go_on, simulate
-    from fast.flows import Flow, flow
-    from fast.paths import Collisions, FineTrajectory, Reached, fine_trajectory, follow, trajectory
+    from fast.paths import (
+        Collisions,
+        FineTrajectory,
+        Flow,
+        Reached,
+        fine_trajectory,
+        flow,
+        follow,
+        trajectory,
+    )
     from fast.step import next_collision
 
 __all__ = [
@@ -32,8 +40,16 @@ __all__ = [
 
 _MODULES = {
     "ensemble": ("Ensemble", "Paused", "go_on", "simulate"),
-    "flows": ("Flow", "flow"),
-    "paths": ("Collisions", "FineTrajectory", "Reached", "fine_trajectory", "follow", "trajectory"),
+    "paths": (
+        "Collisions",
+        "FineTrajectory",
+        "Flow",
+        "Reached",
+        "fine_trajectory",
+        "flow",
+        "follow",
+        "trajectory",
+    ),
     "step": ("next_collision",),
 }
 

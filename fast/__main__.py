@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import msgspec
 
 import fast
-from fast import flows
+from fast import paths
 from fast.validation import check_threads
 from scene import Collision, Horizon, Outcome, Scene, State
 from scene.protocol.wire import serve
@@ -28,8 +28,8 @@ def carry(
     scene: Scene, states: Sequence[State], t_end: float
 ) -> list[tuple[Outcome, tuple[float, float] | None]]:
     """Return each particle's outcome at t_end and its first capture interval; refuse only bad starts."""
-    refusals = [flows.refuse(scene, state, t_end) for state in states]
-    run, _ = flows.carry(scene, states, refusals, t_end, check_threads(None))
+    refusals = [paths.refuse(scene, state, t_end) for state in states]
+    run, _ = paths.carry(scene, states, refusals, t_end, check_threads(None))
     return [
         # Only a particle that arrives has a capture interval.
         (outcome, (begin, end) if isinstance(outcome, Horizon) and not math.isnan(begin) else None)

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast.flows import carry
 from fast.kernel import records
 from fast.kernel.compiling import kept
 from fast.kernel.follow import advance
@@ -29,7 +28,7 @@ from fast.kernel.records import (  # isort: skip
 from fast.kernel.scalar_step import KNOWN
 from fast.kernel.walls import wall_residual
 from fast.kernel.worker import DISK, GENERAL, careful_at, new_worker, run_careful
-from fast.paths import FineTrajectory, as_trajectory, fill_fine_path
+from fast.paths import FineTrajectory, as_trajectory, carry, fill_fine_path
 from fast.pieces import laws_in_lanes
 from fast.starts import only_stop
 from fast.step import WALL_NAMES, as_arrays, end_of_path, fitted_start

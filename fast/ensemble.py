@@ -20,10 +20,9 @@ from fast.kernel import records
 from fast.kernel.follow import LANE_ROWS, follow_particles
 from fast.kernel.records import FloatArray, Followed, IntArray, LawsInLanes, Stops, unfilled_ends
 from fast.kernel.single import LARGEST
-from fast.kernel.worker import is_known_throughout, new_worker
+from fast.kernel.worker import awaited, interruptible, is_known_throughout, new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import cycle_stops, initial_states, least_collisions, one_cycle
-from fast.threads import awaited, interruptible
 from fast.units import Units, fit, inward, outward
 
 from fast.validation import (  # isort: skip

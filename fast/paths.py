@@ -1,13 +1,15 @@
-"""Paths of one particle from collision to collision: in binary64, to 31 decimals, or until an event.
+"""Given particles: paths from collision to collision, in binary64 or to 31 decimals; until an event; a flow.
 
 A trajectory carries its time as a sum of two floats, and takes the steps of the lanes where they are shown
 right (fast.kernel.follow). A fine trajectory carries all its numbers so (fast.kernel.fine_step). Events are
 sought among the collisions of a trajectory: the arc hit with which a capture interval begins, the hit with
-which it ends, or the hit after which an energy is reached.
+which it ends, or the hit after which an energy is reached. A flow carries particles to a time, as ensembles
+are followed.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
 from fractions import Fraction
@@ -17,22 +19,28 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
+from fast import ensemble
 from fast.kernel import records
 from fast.kernel.fine_step import fine_path
 from fast.kernel.follow import PATHS
 from fast.kernel.records import ANCHORS_SHAPE, FloatArray, IntArray, unfilled_ends, unfilled_paths
 from fast.kernel.single import ANSWER_LOST
-from fast.kernel.worker import Loops, careful_at, new_worker
+from fast.kernel.worker import Loops, careful_at, follow_path, new_worker
 from fast.pieces import laws_in_lanes
-from fast.starts import only_stop
-from fast.step import WALL_CODES, WALL_NAMES, Start, as_arrays, end_of_path, start_at
-from fast.threads import follow_path
+from fast.starts import least_collisions, only_stop
+
+from fast.step import (  # isort: skip
+    WALL_CODES, WALL_NAMES, Start, as_arrays, end_of_path, fitted_start, next_collision, start_at,
+)  # fmt: skip
 from fast.units import LateTime, fit, scaled
-from fast.validation import MAX_STEPS, check_end, check_energy, check_states
-from scene import Mushroom, Outcome, Scene, State, Undecided, Wall, check_scene
+
+from fast.validation import (  # isort: skip
+    MAX_STEPS, MOST_TO_A_TIME, check_end, check_energy, check_states, check_threads,
+)  # fmt: skip
+from scene import InvalidState, Mushroom, Outcome, Rejected, Scene, State, Undecided, Wall, check_scene
 from scene.geometry import half_width
 from scene.laws import values
-from scene.refusal import BadInput, check_count, shown
+from scene.refusal import BadInput, check_count, check_number, shown
 
 NAMES = np.array([WALL_NAMES[code] for code in range(len(WALL_NAMES))], dtype=object)
 EVENTS = ("capture", "release")
@@ -304,3 +312,94 @@ def captured(scene: Scene, states: FloatArray, walls: Sequence[str]) -> npt.NDAr
     for k, wall in enumerate(walls):
         found[k + 1] = at_arc[k] if wall == "arc" else found[k] and wall == "base"
     return found
+
+
+class Flow(NamedTuple):
+    """N particles at t_end.
+
+    Attributes:
+        outcomes: (N,) Horizon with the state at t_end; Undefined or Undecided for a particle lost before.
+            A particle in a moving table is also Undecided after 10^7 collisions.
+        t_in, t_out: (N,) the first capture interval in the cap [time], cut at t_end; nan for none.
+        wall_counts: (N, 5) collisions with arc, base, left, right, floor.
+        n_careful: (N,) number of collisions computed by the scalar step, not by the SIMD lanes.
+    """
+
+    outcomes: list[Outcome]
+    t_in: FloatArray
+    t_out: FloatArray
+    wall_counts: IntArray
+    n_careful: IntArray
+
+
+def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | None = None) -> Flow:
+    """Carry particles to t_end.
+
+    Args:
+        scene: table and laws of motion.
+        states: the starts, each as for `next_collision`, with t <= t_end.
+        t_end: when to stop [time], finite.
+        threads: number of threads; default: one per core. The results do not depend on it.
+
+    Raises:
+        InvalidState: a start is not a State or not in this table; the particle is named.
+        BadInput: another argument is bad; naming field, value and bound.
+
+    Source: captured means |sin phi| > nu at the arc, sec. 3.2.
+    """
+    check_scene(scene)
+    threads = check_threads(threads)
+    states = check_states(scene, states)
+    t_end = check_number("t_end", t_end)
+    refusals = [refuse(scene, state, t_end) for state in states]
+    for i, refusal in enumerate(refusals):
+        if isinstance(refusal, Rejected):
+            raise InvalidState(f"particle {i}: {refusal.reason}")
+    return carry(scene, states, refusals, t_end, threads)[0]
+
+
+def carry(
+    scene: Scene, states: Sequence[State], refusals: Sequence[Outcome | None], t_end: float, threads: int
+) -> tuple[Flow, float]:
+    """Carry particles to t_end, those whose units agree together; those refused stay where they are.
+
+    Returns:
+        What became of them, and the seconds that took.
+
+    Raises:
+        BadInput: the scene does not fit into binary64: see fast.units.
+    """
+    starts = {i: fitted_start(scene, states[i]) for i, refusal in enumerate(refusals) if refusal is None}
+    every, outcomes, seconds = unfilled_ends(np.empty((len(states), 6)), 1, (1, 1)), list(refusals), 0.0
+    for units in sorted({start.units for start in starts.values()}):
+        those = [i for i, start in starts.items() if start.units == units]
+        rows, walls = as_arrays([starts[i] for i in those])
+        done = unfilled_ends(rows, 1, (1, 1))
+        stop = only_stop(units.horizon(t_end))
+        seconds += ensemble.follow(laws_in_lanes(fit(scene).scene), done, walls, stop, threads)
+        # t, its low part, x, y, vx, vy; begin and end of the capture interval
+        numbers = np.column_stack([done.states, done.t_in[:, 0, 0], done.t_out[:, 0, 0]])
+        numbers, is_kept = scaled(numbers, np.append(units.of_step(), [units.time, units.time]))
+        is_lost = ~is_kept.all(axis=1)
+        done.codes[is_lost], numbers[is_lost, 6:] = ANSWER_LOST, np.nan
+        done.t_in[:, 0, 0], done.t_out[:, 0, 0] = numbers[:, 6], numbers[:, 7]
+        for whole, own in zip(every, done, strict=True):
+            whole[those] = own
+        ends = zip(those, done.codes.tolist(), done.counts.sum(axis=1), numbers[:, 2:6], strict=True)
+        for i, code, n, place in ends:
+            outcomes[i] = end_of_path(code, scene, states[i], n, t_end, place)
+    found = [outcome for outcome in outcomes if outcome is not None]
+    return Flow(found, every.t_in[:, 0, 0], every.t_out[:, 0, 0], every.counts, every.careful), seconds
+
+
+def refuse(scene: Scene, state: State, t_end: float) -> Rejected | Undecided | None:
+    """Return why a particle cannot start so, or is not followed so far; else None."""
+    outcome = next_collision(scene, state, t_end)
+    if isinstance(outcome, Rejected | Undecided):
+        return outcome
+    fitted, start = fit(scene), fitted_start(scene, state)
+    s = start.state
+    ahead = least_collisions(fitted.scene, math.hypot(s.vx, s.vy), start.units.horizon(t_end) - s.t)
+    if ahead > MOST_TO_A_TIME:
+        return Undecided(f"t_end = {t_end!r} is over {ahead:.0e} collisions away, must be at most 1e7")
+    return None

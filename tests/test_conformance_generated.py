@@ -45,7 +45,7 @@ from conformance.plain.step import MAX_COLLISIONS, BangBangMotion, ConstantMotio
 from conformance.suite.checks import checks_of
 from conformance.suite.symmetry import Transform, draw_transform
 from conformance.verify import Verdict, verify_line
-from fast import flows
+from fast import paths
 from fast.__main__ import carry, follow
 from scene import BadInput, BangBang, Fourier, Horizon, Mushroom, Rejected, State, Undecided, from_data
 from scene.given import MAX_KNOTS
@@ -395,7 +395,7 @@ def test_a_particle_that_is_lost_after_its_capture_has_no_interval(monkeypatch):
         assert interval is not None
     assert plain.flow(scene, [start], t_end, lost) == [(Undecided("lost"), None)]
     run = SimpleNamespace(outcomes=[Undecided("lost")], t_in=np.array([1.0]), t_out=np.array([2.0]))
-    monkeypatch.setattr(flows, "carry", lambda *_: (run, 0.0))
+    monkeypatch.setattr(paths, "carry", lambda *_: (run, 0.0))
     assert carry(scene, [start], t_end) == [(Undecided("lost"), None)]
 
 

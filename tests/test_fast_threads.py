@@ -12,7 +12,7 @@ import pytest
 import fast
 from fast import ensemble, paths
 from fast.kernel.follow import PATHS
-from fast.threads import LONG, follow_path
+from fast.kernel.worker import LONG, follow_path
 from scene import State, load
 
 SCENE, START = load("moving-cap"), State(0.0, 0.1, 0.2, 3.0, 4.0)

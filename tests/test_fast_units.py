@@ -97,7 +97,7 @@ def test_the_search_sees_a_stepper_that_does_not_scale(monkeypatch, tally):
         return Fitted(scene, 0, 0, compiled, pack_scene(compiled, 0, 0))
 
     monkeypatch.setattr(stepper, "fit", unfitted)
-    monkeypatch.setattr(import_module("fast.flows"), "fit", unfitted)
+    monkeypatch.setattr(import_module("fast.paths"), "fit", unfitted)
     with np.errstate(all="ignore"), pytest.raises(AssertionError):
         search_scalings(tally)
 

@@ -34,7 +34,7 @@ import scene as scenes
 from conformance.audit.runs import scene_named
 from conformance.audit.tolerances import FloatArray, Mean, mean
 from conformance.files import write_file
-from fast.flows import carry
+from fast.paths import carry
 from scene import Fourier, Horizon, Mushroom, State
 from scene.geometry import TableAt, table_at
 from scene.laws import value

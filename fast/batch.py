@@ -20,9 +20,9 @@ from fast.kernel.lane_laws import know_laws, set_reference
 from fast.kernel.laws import set_anchors
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, COARSE, FAR, HORIZON, MARKED, MAX_CORRECTIONS, MOVED, Compiled, FloatArray, IntArray,
-    Particle, Paths, copy_rows, load, particle_at, unfilled_ends, unfilled_paths, whole_registers,
-    write_state, write_step,
+    ANCHORS_SHAPE, COARSE, FAR, MARKED, MAX_CORRECTIONS, MOVED, Compiled, FloatArray, IntArray,
+    Particle, copy_rows, load, particle_at, unfilled_ends, whole_registers,
+    write_state,
 )  # fmt: skip
 
 from fast.kernel.scalar_step import KNOWN
@@ -76,18 +76,20 @@ def residual(particle, scene, anchors):
 
 
 @kept(error_model="numpy")
-def fill_careful(step_at, scene, anchors, states, walls, n_times, paths):
-    """Fill in a careful step from each start, n_times over: see `Paths`, of one collision."""
+def fill_careful(step_at, scene, states, walls, n_times, found):
+    """Fill in codes, times and ends of a careful step from each start, n_times over."""
+    codes, times, ends = found
+    anchors = np.zeros(ANCHORS_SHAPE)
     for k in range(n_times * states.shape[0]):
         i = k % states.shape[0]
         known = particle_at(states, i, walls[i]), np.inf, KNOWN, scene, anchors
-        paths.codes[i], dt, particle = run_careful(step_at, known)
-        if paths.codes[i] < HORIZON:
-            write_step(paths, i, 0, dt, particle)
-        write_state(paths.ends, i, particle)
+        codes[i], times[i], particle = run_careful(step_at, known)
+        write_state(ends, i, particle)
 
 
-def take_careful_steps(compiled: Compiled, states: FloatArray, walls: IntArray, n_times: int = 1) -> Paths:
+def take_careful_steps(
+    compiled: Compiled, states: FloatArray, walls: IntArray, n_times: int = 1
+) -> tuple[IntArray, FloatArray, FloatArray]:
     """Take a careful step from each of N states, all in the kernel's units; see `careful_steps`.
 
     Args:
@@ -95,10 +97,14 @@ def take_careful_steps(compiled: Compiled, states: FloatArray, walls: IntArray, 
         states: (N, 6) t, its low part, x, y, vx, vy.
         walls: (N,) codes of the walls that they leave.
         n_times: how often to do all this, where its time is measured.
+
+    Returns:
+        (N,) codes of the walls that are met, or of what comes instead; (N,) times of flight; (N, 6) states
+        after.
     """
-    paths = unfilled_paths(len(states), 1)
-    fill_careful(careful_at(), compiled, np.zeros(ANCHORS_SHAPE), states, walls, n_times, paths)
-    return paths
+    found = np.zeros(len(states), np.int64), np.empty(len(states)), np.empty((len(states), 6))
+    fill_careful(careful_at(), compiled, states, walls, n_times, found)
+    return found
 
 
 def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple[list[Outcome], float]:
@@ -117,10 +123,11 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
     compiled = fit(scene).compiled
     take_careful_steps(compiled, rows[:0], walls[:0])  # compiles, or loads from the cache
     begin = time.perf_counter()
-    paths = take_careful_steps(compiled, rows, walls, n_times)
+    codes, times, ends = take_careful_steps(compiled, rows, walls, n_times)
     seconds = time.perf_counter() - begin
     outcomes: list[Outcome] = []
-    for state, start, code, row in zip(states, starts, paths.codes.tolist(), paths.steps[:, 0], strict=True):
+    steps = np.column_stack([times, np.delete(ends, 1, axis=1)])
+    for state, start, code, row in zip(states, starts, codes.tolist(), steps, strict=True):
         if code in WALL_NAMES:
             outcomes.append(Collision(WALL_NAMES[code], *outward(row, start.units.of_step()).tolist()))
         else:  # without a horizon only what never moves meets no wall
@@ -227,6 +234,6 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
             if not is_right or is_folded or not is_met:
                 found.append(None)
                 continue
-            numbers = outward(np.array([row[0], start.state.t + row[0], *row[1:]]), start.units.of_step())
+            numbers = outward(np.array([row[0], start.particle.t + row[0], *row[1:]]), start.units.of_step())
             found.append(Collision(WALL_NAMES[int(hit)], *numbers.tolist()))
     return found

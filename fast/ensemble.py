@@ -439,13 +439,16 @@ def go_on(
             size; or the cycles reach a time at which the lanes no longer resolve the phases of the laws.
     """
     plan = planned(scene, n_particles, energy, n_cycles, seed, first, threads, phases, progress)
-    own: dict[str, Any] = {"seed": plan.seed, "first": plan.first, "phases": check_phases(phases)}
+    own: dict[str, Any] = {"n_particles": n_particles, "energy": plan.energy0, "seed": plan.seed}
+    own |= {"first": plan.first, "phases": check_phases(phases)}
     asked = {"table": type(scene).__name__, **laws(scene), **own}
     if before is None:
         done, seconds = plan.followed(plan.starts(), LANE_ROWS)
         return Paused(plan.ensemble(done, seconds), done.lanes, asked)
-    n_before, n_passed = _passed(plan, before)
+    if not (isinstance(before, Paused) and isinstance(before.ensemble, Ensemble)):
+        raise BadInput(f"before = {shown(before)}, must be None or what go_on has returned")
     _check_same(asked if before.asked is None else before.asked, asked)
+    n_before, n_passed = _passed(plan, before)
     done, seconds = plan.followed(np.full((n_particles, 6), np.nan), LANE_ROWS, before.lanes, n_passed)
     after, anew = plan.ensemble(done, seconds), np.flatnonzero(done.codes == records.ANEW)
     for name in BY_CYCLE:
@@ -470,23 +473,7 @@ def _check_same(there: dict[str, Any], asked: dict[str, Any]) -> None:
 
 def _passed(plan: Plan, before: Paused) -> tuple[int, int]:
     """Return how many cycles and stops an ensemble has passed, after a look at whether it can go on so."""
-    n, n_cycles, looks = plan.size
-    if not (
-        isinstance(before, Paused)
-        and isinstance(before.ensemble, Ensemble)
-        and np.ndim(before.lanes) == 2
-        and isinstance(before.asked, dict | None)
-    ):
-        raise BadInput(f"before = {shown(before)}, must be None or what go_on has returned")
-    old = before.ensemble
-    n_before = old.cycle_energies.shape[1]
-    there = (old.energy0, *before.lanes.shape, old.phase_energies.shape[2], old.t_in.shape[2])
-    wanted = (plan.energy0, n, LANE_ROWS, looks - 1, plan.stops.mouth_minima.shape[1])
-    for name, found, value in zip(
-        ("energy", "n_particles", "rows of lanes", "phases", "minima of nu"), there, wanted, strict=True
-    ):
-        if found != value:
-            raise BadInput(f"before: {name} = {found}, must be {value}")
+    n_cycles, n_before = plan.size[1], before.ensemble.cycle_energies.shape[1]
     if not 1 <= n_before <= n_cycles:
         raise BadInput(f"n_cycles = {n_cycles}, must be at least the {n_before} of before")
     n_passed = n_before * (len(plan.stops.times) // n_cycles)

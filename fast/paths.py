@@ -21,16 +21,16 @@ from mpmath import fp
 
 from fast import ensemble
 from fast.kernel import records
-from fast.kernel.fine_step import fine_path
+from fast.kernel.fine_step import FineState, fine_path
 from fast.kernel.follow import PATHS
-from fast.kernel.records import ANCHORS_SHAPE, FloatArray, IntArray, unfilled_ends, unfilled_paths
+from fast.kernel.records import ANCHORS_SHAPE, FloatArray, IntArray, unfilled_ends
 from fast.kernel.single import ANSWER_LOST
 from fast.kernel.worker import Loops, careful_at, follow_path, new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import least_collisions, only_stop
 
 from fast.step import (  # isort: skip
-    WALL_CODES, WALL_NAMES, Start, as_arrays, end_of_path, fitted_start, next_collision, start_at,
+    WALL_NAMES, Start, as_arrays, end_of_path, fitted_start, next_collision, start_at,
 )  # fmt: skip
 from fast.units import LateTime, fit, scaled
 
@@ -85,28 +85,30 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
         start = start_at(scene, state, min(t_end, sys.float_info.max))
     except LateTime as error:
         return Collisions([], np.empty((0, 6)), Undecided(str(error)))
-    rows, walls = as_arrays([start])
+    in_lanes, exponents = laws_in_lanes(fit(scene).scene), start.units.of_step()
+    rows, (wall,) = as_arrays([start])
+    stop = only_stop(start.units.horizon(t_end))
+    worker = new_worker(in_lanes, stop, unfilled_ends(rows, 1, (1, 1)), loops=Loops(careful_at(), 0, 0))
     # Steps are brought back in passing: a pass of its own took a quarter of the time.
-    paths, exponents = unfilled_paths(1, n_collisions, start.units.of_step()), start.units.of_step()
-    if n_collisions:
-        in_lanes = laws_in_lanes(fit(scene).scene)
-        stop = only_stop(start.units.horizon(t_end))
-        worker = new_worker(in_lanes, stop, unfilled_ends(rows, 1, (1, 1)), loops=Loops(careful_at(), 0, 0))
-        kernel = PATHS[in_lanes.slope is None, in_lanes.degree]
-        with np.errstate(over="ignore", under="ignore"):  # without the compiler
-            follow_path(kernel, (worker, walls, paths), n_collisions, stop.called_off)
-    n, code = paths.counts.item(), paths.codes.item()
-    if paths.n_exact.item() < n:
-        n, code = paths.n_exact.item(), ANSWER_LOST
-    steps = paths.steps[0, :n] if n == n_collisions else paths.steps[0, :n].copy()  # not all room is held
+    halves = np.stack([exponents // 2, exponents - exponents // 2])
+    factors = np.ldexp(1.0, np.vstack([halves, -halves]))
+    steps, walls = np.empty((n_collisions, 6)), np.empty(n_collisions, np.int64)
+    kernel = PATHS[in_lanes.slope is None, in_lanes.degree]
+    with np.errstate(over="ignore", under="ignore"):  # without the compiler
+        n, code, n_exact = follow_path(
+            kernel, (worker, wall, factors, steps, walls), n_collisions, stop.called_off
+        )
+    if n_exact < n:
+        n, code = n_exact, ANSWER_LOST
+    steps = steps[:n] if n == n_collisions else steps[:n].copy()  # not all room is held
     outcome: Outcome | None = None
     if n < n_collisions:
         place = place_after(steps, state)
         if code == records.HORIZON and np.isfinite(t_end):
-            place, is_kept = scaled(paths.ends[0, 2:], exponents[2:])
+            place, is_kept = scaled(rows[0, 2:], exponents[2:])
             code = code if is_kept.all() else ANSWER_LOST
         outcome = end_of_path(code, scene, state, n, t_end, place)
-    return Collisions(NAMES.take(paths.walls[0, :n]).tolist(), steps, outcome)
+    return Collisions(NAMES.take(walls[:n]).tolist(), steps, outcome)
 
 
 def place_after(steps: FloatArray, state: State) -> FloatArray:
@@ -166,18 +168,9 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
 
 def fill_fine_path(start: Start, steps: FloatArray, walls: IntArray) -> tuple[int, int]:
     """Fill in steps and walls met, in the kernel's units; returns number of collisions and last code."""
-    s, called_off = start.state, np.zeros(1, np.int64)
-    pairs = np.array([[number, 0.0] for number in (s.t, s.x, s.y, s.vx, s.vy)])
-    given = (
-        start.compiled,
-        np.zeros(ANCHORS_SHAPE),
-        pairs,
-        WALL_CODES[s.wall],
-        np.inf,
-        steps,
-        walls,
-        called_off,
-    )
+    p, called_off = start.particle, np.zeros(1, np.int64)
+    fine = FineState(*((number, 0.0) for number in (p.t, p.x, p.y, p.vx, p.vy)))
+    given = (start.compiled, np.zeros(ANCHORS_SHAPE), fine, p.wall, steps, walls, called_off)
     found: tuple[int, int] = follow_path(fine_path, given, len(steps), called_off)
     return found
 
@@ -397,9 +390,9 @@ def refuse(scene: Scene, state: State, t_end: float) -> Rejected | Undecided | N
     outcome = next_collision(scene, state, t_end)
     if isinstance(outcome, Rejected | Undecided):
         return outcome
-    fitted, start = fit(scene), fitted_start(scene, state)
-    s = start.state
-    ahead = least_collisions(fitted.scene, math.hypot(s.vx, s.vy), start.units.horizon(t_end) - s.t)
+    start = fitted_start(scene, state)
+    p = start.particle
+    ahead = least_collisions(fit(scene).scene, math.hypot(p.vx, p.vy), start.units.horizon(t_end) - p.t)
     if ahead > MOST_TO_A_TIME:
         return Undecided(f"t_end = {t_end!r} is over {ahead:.0e} collisions away, must be at most 1e7")
     return None

@@ -105,19 +105,14 @@ class Start(NamedTuple):
     """A state in the kernel's units, with what leads there and back.
 
     Attributes:
-        state: in the kernel's units.
+        particle: in the kernel's units.
         units: those.
         compiled: the scene's numbers in them.
     """
 
-    state: State
+    particle: Particle
     units: Units
     compiled: Compiled
-
-    def row(self) -> FloatArray:
-        """Return the state as the kernels take it: t, its low part, x, y, vx, vy."""
-        s = self.state
-        return np.array([s.t, 0.0, s.x, s.y, s.vx, s.vy])
 
 
 def start_at(scene: Scene, state: State, t_end: float = sys.float_info.max) -> Start:
@@ -133,20 +128,20 @@ def fitted_start(scene: Scene, state: State) -> Start:
     """
     fitted = fit(scene)
     units = fitted.units(state)
-    inner = units.state(state)
+    t, x, y, vx, vy = units.numbers(state)
+    particle = Particle(t, 0.0, x, y, vx, vy, WALL_CODES[state.wall])
     if state.wall is not None:
-        particle = Particle(inner.t, 0.0, inner.x, inner.y, inner.vx, inner.vy, WALL_CODES[state.wall])
         share = single.off_wall(careful_at(), fitted.compiled, particle)
         if share:
             away = f"{share:.3g} of that wall's size"
             raise InvalidState(f"state.wall = {state.wall!r}, but the state is {away} away from that wall")
-    return Start(inner, units, fitted.compiled)
+    return Start(particle, units, fitted.compiled)
 
 
 def as_arrays(starts: Sequence[Start]) -> tuple[FloatArray, IntArray]:
     """Return N states as the kernels take them: (N, 6) t, its low part, x, y, vx, vy; (N,) codes of walls."""
-    rows = np.array([start.row() for start in starts]).reshape(-1, 6)
-    return rows, np.array([WALL_CODES[start.state.wall] for start in starts], dtype=np.int64)
+    rows = np.array([start.particle[:6] for start in starts]).reshape(-1, 6)
+    return rows, np.array([start.particle.wall for start in starts], dtype=np.int64)
 
 
 TOO_LATE = (

@@ -151,8 +151,8 @@ class Units(NamedTuple):
     length: int
     time: int
 
-    def state(self, state: State) -> State:
-        """Return a state in the kernel's units.
+    def numbers(self, state: State) -> list[float]:
+        """Return t, x, y, vx, vy of a state in the kernel's units.
 
         Raises:
             InvalidState: it is too fast or too slow for its table, or loses bits beside the table's size.
@@ -171,7 +171,7 @@ class Units(NamedTuple):
                 f"speed = {max(abs(state.vx), abs(state.vy))!r}, must be 0 or at least 2^-400 beside the"
                 " table's size and period"
             )
-        return State(**inner, wall=state.wall)
+        return list(inner.values())
 
     def horizon(self, t_end: float) -> float:
         """Return a horizon, which may be infinite, in the kernel's units.

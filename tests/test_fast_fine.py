@@ -19,7 +19,7 @@ from conformance.grading.agreement import compare
 from conformance.grading.agreement import exact as enclosed
 from conformance.strategies import scenes_and_states
 from fast.kernel import records
-from fast.kernel.fine_step import fine_path
+from fast.kernel.fine_step import FineState, fine_path
 from fast.kernel.records import ANCHORS_SHAPE
 from fast.step import WALL_CODES
 from fast.units import compile_scene
@@ -129,9 +129,9 @@ def test_a_flight_up_a_deep_stem_keeps_its_decimals(depth):
 def test_rounding_a_state_of_pairs_is_not_taken_for_a_gap():
     """A side and the floor met together but for 3e-7 of 1e-10, and the low parts hold which is first."""
     scene, d = Stem(w=1.0, h=1.0), round(1e-10 * 2**53) * 2.0**-53
-    start = np.array([[0.0, 0.0], [1.0 - d, 0.0], [d - 1.0, -5e-17], [1.0, 0.0], [2e-7 - 1.0, 0.0]])
+    start = FineState((0.0, 0.0), (1.0 - d, 0.0), (d - 1.0, -5e-17), (1.0, 0.0), (2e-7 - 1.0, 0.0))
     steps, met = np.empty((1, 6, 2)), np.empty(1, dtype=np.int64)
     anchors, called_off = np.zeros(ANCHORS_SHAPE), np.zeros(1, np.int64)
     compiled, wall = compile_scene(scene), WALL_CODES[None]
-    n, code = fine_path(compiled, anchors, start, wall, np.inf, steps, met, called_off)
+    n, code = fine_path(compiled, anchors, start, wall, steps, met, called_off)
     assert (n, code) == (0, records.CORNER)

@@ -149,8 +149,8 @@ def errors_of(scene, rows, codes, answers):
     compiled = compile_scene(scene)
 
     def careful(states):
-        paths = take_careful_steps(compiled, states, codes[:-1])
-        return paths.codes, paths.steps[:, 0][:, [0, 2, 3, 4, 5]]
+        met, times, ends = take_careful_steps(compiled, states, codes[:-1])
+        return met, np.column_stack([times, ends[:, 2:]])
 
     found, truth = careful(rows)
     sizes, is_clear = np.abs(truth), found == codes[1:]

@@ -190,7 +190,7 @@ def test_what_does_not_fit_is_refused():
         ({}, "n_cycles = 1, must be at least the 2 of before"),
         ({"n_cycles": 3, "n_particles": 5}, "before: n_particles = 4, must be 5"),
         ({"n_cycles": 3, "energy": 11.0}, "before: energy = 10.0, must be 11.0"),
-        ({"n_cycles": 3, "phases": (0.5,)}, "before: phases = 0, must be 1"),
+        ({"n_cycles": 3, "phases": (0.5,)}, r"before: phases = \(\), must be \(0.5,\)"),
         ({"n_cycles": 3, "first": -1}, "first = -1, must be 0 to"),
         ({"n_cycles": 3, "seed": 1}, "before: seed = 0, must be 1"),
         ({"n_cycles": 3, "first": 4}, "before: first = 0, must be 4"),

@@ -62,7 +62,7 @@ def test_an_interrupt_is_heeded_in_the_middle_of_a_path(begun, monkeypatch, call
         watching = watched(getattr(module, name), lambda given, place=place: len(given[place]))
         monkeypatch.setattr(module, name, watching)
     for key, kernel in PATHS.items():
-        monkeypatch.setitem(PATHS, key, watched(kernel, lambda given: len(given[1])))
+        monkeypatch.setitem(PATHS, key, watched(kernel, lambda _: True))
     quick = State(0.0, 0.1, 0.2, 3e7, 4e7)  # a second or more, where nobody interrupts
     with pytest.raises(KeyboardInterrupt):
         {
@@ -73,10 +73,8 @@ def test_an_interrupt_is_heeded_in_the_middle_of_a_path(begun, monkeypatch, call
             "fine_trajectory": lambda: fast.fine_trajectory(SCENE, START, LENGTH),
         }[call]()
     found, given = followed.get()  # the kernel has ended, and not because it was done
-    if call == "fine_trajectory":
+    if "trajectory" in call:
         assert found[0] < LENGTH
-    elif call == "trajectory":
-        assert given[2].counts[0] < 10 * LENGTH
     else:
         assert given[0].followed.counts.sum() == 0
 

@@ -77,10 +77,10 @@ def two_product(a, b):
 
 
 @kernel
-def multiplied(a, a_low, b, b_low):
-    """Return (a + a_low) (b + b_low) as a sum of two floats."""
-    p, e = two_product(a, b)
-    return two_sum(p, e + (a * b_low + a_low * b))
+def mul(a, b):
+    """Return a b, of pairs."""
+    p, e = two_product(a[0], b[0])
+    return two_sum(p, e + (a[0] * b[1] + a[1] * b[0]))
 
 
 @packed
@@ -156,15 +156,15 @@ def short_sine_cosine(r, tail):
     """
     z, z_low = two_product(r, r)
     p, p_low = two_sum(1.0 / 120.0, polynomial(z, SINE_FROM_7) * z)
-    p, p_low = multiplied(p, p_low + ONE_120TH_LOW, z, z_low)
+    p, p_low = mul((p, p_low + ONE_120TH_LOW), (z, z_low))
     p, e = two_sum(-1.0 / 6.0, p)
-    p, p_low = multiplied(p, p_low + (e - ONE_6TH_LOW), z, z_low)
-    p, p_low = multiplied(p, p_low, r, 0.0)
+    p, p_low = mul((p, p_low + (e - ONE_6TH_LOW)), (z, z_low))
+    p, p_low = mul((p, p_low), (r, 0.0))
     s, s_low = two_sum(r, p)
     q, q_low = two_sum(1.0 / 24.0, polynomial(z, COSINE_FROM_6) * z)
-    q, q_low = multiplied(q, q_low + ONE_24TH_LOW, z, z_low)
+    q, q_low = mul((q, q_low + ONE_24TH_LOW), (z, z_low))
     q, e = two_sum(-0.5, q)
-    q, q_low = multiplied(q, q_low + e, z, z_low)
+    q, q_low = mul((q, q_low + e), (z, z_low))
     c, c_low = two_sum(1.0, q)
     return s, s_low + fma(c, tail, p_low), c, c_low + fma(-s, tail, q_low)
 
@@ -241,15 +241,9 @@ def sub(a, b):
 
 
 @kernel
-def mul(a, b):
-    """Return a b."""
-    return multiplied(a[0], a[1], b[0], b[1])
-
-
-@kernel
 def times(factor, a):
     """Return a float times a pair."""
-    return multiplied(factor, 0.0, a[0], a[1])
+    return mul((factor, 0.0), a)
 
 
 @kernel

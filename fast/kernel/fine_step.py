@@ -15,6 +15,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from fast.kernel.arithmetic import add, div, fine_sine_cosine, mul, sub, times
 from fast.kernel.compiling import kept, kernel
 from fast.kernel.laws import leg_at, set_anchors
@@ -235,9 +237,9 @@ def rounded(state, wall):
 
 
 @kernel
-def fine_step(wall, state, limit, scene, anchors):
+def fine_step(wall, state, scene, anchors):
     """Return (code, flight time, state after) from a state on `wall`; the anchors hold the laws at it."""
-    code, s = first_event(rounded(state, wall), limit, scene, anchors)
+    code, s = first_event(rounded(state, wall), np.inf, scene, anchors)
     if code >= HORIZON:
         return code, (s, 0.0), state
     time, is_settled = corrected(code, s, code == wall, state, scene)
@@ -251,19 +253,11 @@ def fine_step(wall, state, limit, scene, anchors):
 
 
 @kept(error_model="numpy", nogil=True)
-def fine_path(scene, anchors, start, wall, limit, out, met, called_off):
+def fine_path(scene, anchors, state, wall, out, met, called_off):
     """Fill out[i] with dt, t, x, y, vx, vy as pairs and met[i] with the wall; returns number and last code.
 
-    `start` (5, 2): t, x, y, vx, vy as pairs. `limit` [time] is the horizon of every single step. `called_off`
-    is as in fast.kernel.records.Stops.
+    `called_off` is as in fast.kernel.records.Stops.
     """
-    state = FineState(
-        (start[0, 0], start[0, 1]),
-        (start[1, 0], start[1, 1]),
-        (start[2, 0], start[2, 1]),
-        (start[3, 0], start[3, 1]),
-        (start[4, 0], start[4, 1]),
-    )
     for i in range(out.shape[0]):
         if called_off[0] != 0:
             return i, wall
@@ -274,7 +268,7 @@ def fine_path(scene, anchors, start, wall, limit, out, met, called_off):
         crossed = crossed_wall(rounded(state, wall), scene, anchors) if i == 0 else NO_WALL
         if crossed != NO_WALL:
             return i, BEYOND + crossed
-        wall, time, state = fine_step(wall, state, limit, scene, anchors)
+        wall, time, state = fine_step(wall, state, scene, anchors)
         if wall >= HORIZON:
             return i, wall
         met[i] = wall

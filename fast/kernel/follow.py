@@ -504,22 +504,27 @@ def _path(is_slope_moving, form):
     degree, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
 
     @kept(is_slope_moving, form, nogil=True, **HOW)
-    def follow_path(worker, walls, paths):
-        """Follow each particle of a worker by itself, through as many collisions as `paths` has room for."""
+    def follow_path(worker, wall, factors, steps, walls):
+        """Follow a worker's one particle through as many collisions as there is room for in steps and walls.
+
+        Returns:
+            How many there are, the last wall's code or what came instead, and how many steps lost no bit by
+            `factors`, before the first that did: see `write_step`.
+        """
         waves, slope = worker.waves if is_waves else None, None if is_slope_moving else worker.slope
         states, a = worker.followed.states, worker.pools[GENERAL]
-        for j in range(states.shape[0]):
-            load(a, FIRST, particle_at(states, j, walls[j]), False)
-            code, n = walls[j], 0
-            while n < paths.walls.shape[1] and worker.stops.called_off[0] == 0:
-                code = next_hit(a, worker, waves, slope, degree)
-                if code >= HORIZON:
-                    break
-                paths.walls[j, n] = code
-                write_step(paths, j, n, a[S], particle_of(a, FIRST))
-                n += 1
-            paths.codes[j], paths.counts[j] = code, n
-            write_state(paths.ends, j, particle_of(a, FIRST))
+        load(a, FIRST, particle_at(states, 0, wall), False)
+        code, n, n_exact = wall, 0, steps.shape[0]
+        while n < steps.shape[0] and worker.stops.called_off[0] == 0:
+            code = next_hit(a, worker, waves, slope, degree)
+            if code >= HORIZON:
+                break
+            walls[n] = code
+            if not write_step(steps, n, factors, a[S], particle_of(a, FIRST)):
+                n_exact = min(n_exact, n)
+            n += 1
+        write_state(states, 0, particle_of(a, FIRST))
+        return n, code, n_exact
 
     return follow_path
 

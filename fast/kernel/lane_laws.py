@@ -37,13 +37,6 @@ SHORT, LONG = (0,) * PARABOLA, (0,) * SERIES  # as `law_at` takes them
 
 
 @packed
-def one_power(half_bend, rate, mean, rise, u, u_before, coefficient):
-    """Take one step of Horner's rule, for the value's quotient `rise` by the time and what is made of it."""
-    half_bend, rate, rise = fma(half_bend, u, rate), fma(rate, u, rise), fma(rise, u, coefficient)
-    return half_bend, rate, fma(mean, u_before, rise), rise
-
-
-@packed
 def law_at(a, place, stride, u, u_before, degree):
     """Return a law, two derivatives, and its mean rate (f(u) - f(u_before)) / (u - u_before).
 
@@ -57,24 +50,16 @@ def law_at(a, place, stride, u, u_before, degree):
         u: time since the reference.
         u_before: another one.
         degree: a tuple as long as the degree, PARABOLA or SERIES. The compiler knows its length
-            and keeps those steps that there are; a loop inside a loop over lanes would not be packed.
+            and unrolls the loop, else the loop over lanes around it would not be packed.
     """
     n = len(degree)
     rate = a[place + (n + 1) * stride]
     rise = fma(rate, u, a[place + n * stride])
-    p = (0.0, rate, fma(rate, u_before, rise), rise)
-    if n == 12:
-        p = one_power(*p, u, u_before, a[place + 11 * stride])
-        p = one_power(*p, u, u_before, a[place + 10 * stride])
-        p = one_power(*p, u, u_before, a[place + 9 * stride])
-        p = one_power(*p, u, u_before, a[place + 8 * stride])
-        p = one_power(*p, u, u_before, a[place + 7 * stride])
-        p = one_power(*p, u, u_before, a[place + 6 * stride])
-        p = one_power(*p, u, u_before, a[place + 5 * stride])
-        p = one_power(*p, u, u_before, a[place + 4 * stride])
-        p = one_power(*p, u, u_before, a[place + 3 * stride])
-        p = one_power(*p, u, u_before, a[place + 2 * stride])
-    half_bend, rate, mean, rise = p
+    half_bend, mean = 0.0, fma(rate, u_before, rise)
+    for k in range(n - 1, 1, -1):
+        half_bend, rate = fma(half_bend, u, rate), fma(rate, u, rise)
+        rise = fma(rise, u, a[place + k * stride])
+        mean = fma(mean, u_before, rise)
     value = a[place] + fma(rise, u, a[place + stride])
     return value, fma(rate, u, rise), 2.0 * fma(half_bend, u, rate), mean
 

@@ -95,6 +95,14 @@ def mouth_crossing(outset, w0, w1, k, limits):
 
 
 @part
+def nearer(f, d, wall, other_f, other_d, other):
+    """Return the lesser of two quotients f / d and its wall; the second one counts where its f is above 0."""
+    less = fma(other_d, f, -other_f * d)
+    less = less if other_f > 0.0 else 0.0
+    return other_f if less > 0.0 else f, other_d if less > 0.0 else d, other if less > 0.0 else wall
+
+
+@part
 def nearest_below(wall, f_r, d_r, f_l, d_l, f_f, d_f):
     """Return the least quotient f / d of right, left and floor, by cross-multiplication, and its wall.
 
@@ -105,19 +113,8 @@ def nearest_below(wall, f_r, d_r, f_l, d_l, f_f, d_f):
     f_f = 0.0 if wall == ON_FLOOR else f_f
     f = f_r if f_r > 0.0 else 1.0
     d = d_r if f_r > 0.0 else 0.0
-    d = d if d > 0.0 else 0.0
-    side = ON_RIGHT
-    best_l = fma(d_l, f, -f_l * d)
-    best_l = best_l if f_l > 0.0 else 0.0
-    f = f_l if best_l > 0.0 else f
-    d = d_l if best_l > 0.0 else d
-    side = ON_LEFT if best_l > 0.0 else side
-    best_f = fma(d_f, f, -f_f * d)
-    best_f = best_f if f_f > 0.0 else 0.0
-    f = f_f if best_f > 0.0 else f
-    d = d_f if best_f > 0.0 else d
-    side = ON_FLOOR if best_f > 0.0 else side
-    return f, d, side
+    f, d, side = nearer(f, d if d > 0.0 else 0.0, ON_RIGHT, f_l, d_l, ON_LEFT)
+    return nearer(f, d, side, f_f, d_f, ON_FLOOR)
 
 
 @part

@@ -229,44 +229,6 @@ class Place(NamedTuple):
     y_low: float
 
 
-class Paths(NamedTuple):
-    """What the careful kernel fills in: paths of at most K collisions from each of N starts.
-
-    Attributes:
-        steps: (N, K, 6) dt, t, x, y, vx, vy after each collision, times `factors`.
-        factors: (4, 6) two powers of two by which steps are multiplied, and their inverses: one alone may
-            be none of the floats.
-        n_exact: (N,) how many steps lost no bit by that, before the first that did.
-        walls: (N, K) codes of the walls hit.
-        counts: (N,) how many collisions there are.
-        codes: (N,) the last wall's code where there are K, else what came instead.
-        ends: (N, 6) the last state, as in an array of states; for HORIZON the one there.
-    """
-
-    steps: FloatArray
-    factors: FloatArray
-    n_exact: IntArray
-    walls: IntArray
-    counts: IntArray
-    codes: IntArray
-    ends: FloatArray
-
-
-def unfilled_paths(n_starts: int, n_collisions: int, exponents: IntArray | None = None) -> Paths:
-    """Return what is to be filled in for paths from some starts; steps times 2^exponents (6,), if any."""
-    by = np.zeros(6, np.int64) if exponents is None else exponents
-    halves = np.stack([by // 2, by - by // 2])
-    return Paths(
-        np.empty((n_starts, n_collisions, 6)),
-        np.ldexp(1.0, np.vstack([halves, -halves])),
-        np.full(n_starts, n_collisions, np.int64),
-        np.empty((n_starts, n_collisions), np.int64),
-        np.zeros(n_starts, np.int64),
-        np.zeros(n_starts, np.int64),
-        np.empty((n_starts, 6)),
-    )
-
-
 class Stops(NamedTuple):
     """Instants at which particles are looked at, in order.
 
@@ -355,17 +317,20 @@ def write_state(states, i, particle):
 
 
 @kernel
-def write_step(paths, i, k, dt, particle):
-    """Write collision k of path i: dt, t, x, y, vx, vy."""
+def write_step(steps, i, factors, dt, particle):
+    """Write row i of steps, dt, t, x, y, vx, vy after a collision; returns whether no number lost a bit.
+
+    They are multiplied by `factors` (4, 6), two powers of two, which come with their inverses: one alone may
+    be none of the floats.
+    """
     numbers = (dt, particle.t, particle.x, particle.y, particle.vx, particle.vy)
     is_exact = True
     for column in range(6):
         number = numbers[column]
-        scaled = number * paths.factors[0, column] * paths.factors[1, column]
-        paths.steps[i, k, column] = scaled
-        is_exact = is_exact and scaled * paths.factors[2, column] * paths.factors[3, column] == number
-    if not is_exact:
-        paths.n_exact[i] = min(paths.n_exact[i], k)
+        scaled = number * factors[0, column] * factors[1, column]
+        steps[i, column] = scaled
+        is_exact = is_exact and scaled * factors[2, column] * factors[3, column] == number
+    return is_exact
 
 
 @kernel

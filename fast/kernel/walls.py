@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fast.kernel.arithmetic import SAFETY, dot, fma, multiplied, products, quotient, two_product, two_sum
+from fast.kernel.arithmetic import SAFETY, dot, fma, mul, products, quotient, two_product, two_sum
 from fast.kernel.compiling import kernel, packed, part
 from fast.kernel.laws import increment, rest, width
 from fast.kernel.records import ARC, BASE, CAP, FLOOR, LEFT, MUSHROOM, NO_WALL, RIGHT, STEM
@@ -74,8 +74,8 @@ def wall_residual(wall, x, y, scene, anchors):
         return f + (f_low + anchors[DEPTH, VALUE_LOW]), SAFETY * anchors[DEPTH, VALUE]
     w, w_low = anchors[WIDTH, VALUE], anchors[WIDTH, VALUE_LOW]
     if scene.is_relative:
-        w, w_low = multiplied(w, w_low, anchors[RADIUS, VALUE], anchors[RADIUS, VALUE_LOW])
-    tilt, tilt_low = multiplied(anchors[SLOPE, VALUE], anchors[SLOPE, VALUE_LOW], y, 0.0)
+        w, w_low = mul((w, w_low), (anchors[RADIUS, VALUE], anchors[RADIUS, VALUE_LOW]))
+    tilt, tilt_low = mul((anchors[SLOPE, VALUE], anchors[SLOPE, VALUE_LOW]), (y, 0.0))
     f, f_low = two_sum(w, -x if wall == RIGHT else x)
     f, e = two_sum(f, tilt)
     error = SAFETY * (w + abs(tilt) + abs(x))

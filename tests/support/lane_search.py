@@ -16,7 +16,7 @@ import numpy as np
 
 from fast.batch import LaneRound, as_particle, residual, take_careful_steps
 from fast.kernel import lanes, records
-from fast.kernel.fine_step import fine_path
+from fast.kernel.fine_step import FineState, fine_path
 from fast.kernel.records import DEPTH, RATE, FloatArray
 from scene import Scene
 from support.lane_anywhere import Group, Start, draw_anywhere
@@ -91,8 +91,8 @@ class Round(LaneRound):
 
     def careful_step(self, p: FloatArray, wall: int) -> tuple[int, float, FloatArray]:
         """Return the scalar step's wall, its time, and the state after, from a state and its wall."""
-        paths = take_careful_steps(self.compiled, p[None], np.array([wall]))
-        return int(paths.codes[0]), float(paths.steps[0, 0, 0]), paths.ends[0]
+        codes, times, ends = take_careful_steps(self.compiled, p[None], np.array([wall]))
+        return int(codes[0]), float(times[0]), ends[0]
 
     def careful(self, p: FloatArray, wall: int) -> tuple[int, FloatArray]:
         """Return the careful step's wall and dt, x, y, vx, vy; unfolded, those of the next hit of the arc."""
@@ -132,12 +132,13 @@ class Round(LaneRound):
     def fine(self, p: FloatArray, wall: int) -> FloatArray:
         """Return dt, x, y, vx, vy of a step that meets no base first, from pairs of floats, rounded once."""
         is_folded = bool(self.is_disk and p[3] < 0.0)
-        start = np.array([[p[0], p[1]], *([v, 0.0] for v in p[2:])])
         steps, met = np.zeros((1, 6, 2)), np.zeros(1, dtype=np.int64)
+        t, t_low, x, y, vx, vy = p.tolist()
         if is_folded:
-            start[[2, 4]] *= -1.0
+            y, vy = -y, -vy
+        start = FineState((t, t_low), (x, 0.0), (y, 0.0), (vx, 0.0), (vy, 0.0))
         called_off = np.zeros(1, np.int64)
-        fine_path(self.compiled, self.anchors, start, wall, np.inf, steps, met, called_off)
+        fine_path(self.compiled, self.anchors, start, wall, steps, met, called_off)
         found = np.delete(steps[0, :, 0], 1)
         if is_folded:
             found[[2, 4]] *= -1.0

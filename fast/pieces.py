@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.kernel.arithmetic import MAX_QUADRANT
+from fast.kernel.arithmetic import MAX_QUADRANT, split
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, PARABOLA, SERIES, TWO_WAVES, fill_pieces
 
 from fast.kernel.records import (  # isort: skip
@@ -182,7 +182,7 @@ def _filled(
     compiled: Compiled, period: Fraction | None, origin: Fraction, cuts: list[Cut], degree: int
 ) -> Pieces:
     middles = [origin + cut.begin + cut.holds / 2 for cut in cuts]
-    references = np.array([_pair(middle) for middle in middles])
+    references = np.array([split(middle) for middle in middles])
     coefficients = np.empty((len(cuts), 4, degree + 2))
     fill_pieces(compiled.laws, references, coefficients)
     begins = np.array([float(cut.begin) for cut in cuts])
@@ -190,14 +190,9 @@ def _filled(
     serves = np.array([float(cut.serves - cut.holds / 2) for cut in cuts])
     if period is None:
         half, serves = np.array([math.inf]), np.array([math.inf])
-    high, low = _pair(period) if period is not None else (math.inf, 0.0)
+    high, low = split(period) if period is not None else (math.inf, 0.0)
     _, until = _period_and_until(compiled.laws)
     return Pieces(float(origin), high, low, begins, references, half, serves, coefficients, until)
-
-
-def _pair(number: Fraction) -> tuple[float, float]:
-    high = float(number)
-    return high, float(number - Fraction(high))
 
 
 def _period_and_origin(laws: FloatArray) -> tuple[Fraction | None, Fraction]:

@@ -33,7 +33,7 @@ def initial_states(scene: Scene, n_particles: int, energy: float, seed: int, fir
     u = (raw >> np.uint64(11)).astype(np.float64) * 2.0**-53
     start = start_time(scene)
     x, y = _uniform_in_area(scene, start, u[:, 0], u[:, 1], u[:, 2])
-    speed, along = math.sqrt(2.0 * energy), _directions(u[:, 3])
+    speed, along = math.sqrt(2.0 * energy), directions(np.ascontiguousarray(u[:, 3]))
     out: FloatArray = np.column_stack(
         [np.full(n_particles, start), np.zeros(n_particles), x, y, speed * along[:, 0], speed * along[:, 1]]
     )
@@ -45,17 +45,10 @@ def _uniform_in_area(
 ) -> tuple[FloatArray, FloatArray]:
     now = table_at(fp, scene, t)
     cap_area, stem_area = now.cap_area(), now.stem_area()
-    rho, along = now.r * np.sqrt(a), _directions(0.5 * b)
+    rho, along = now.r * np.sqrt(a), directions(0.5 * b)
     side, depth = now.uniform_in_stem(a, b)
     in_cap = pick * (cap_area + stem_area) < cap_area
     return np.where(in_cap, rho * along[:, 0], side), np.where(in_cap, rho * along[:, 1], -depth)
-
-
-def _directions(turns: FloatArray) -> FloatArray:
-    """Return (n, 2) unit vectors at whole turns from the x axis."""
-    out = np.empty((len(turns), 2))
-    directions(np.ascontiguousarray(turns), out)
-    return out
 
 
 def one_cycle(scene: Scene) -> float:

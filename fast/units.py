@@ -25,7 +25,7 @@ import msgspec
 import numpy as np
 
 from fast.kernel import records
-from fast.kernel.arithmetic import half_pi
+from fast.kernel.arithmetic import half_pi, split
 from fast.kernel.single import LARGEST, LENGTH, TIME, pack_scene, static_time
 
 from fast.kernel.records import (  # isort: skip
@@ -85,9 +85,8 @@ def _omega(law: Fourier) -> tuple[float, float]:
     if law.omega is not None:
         return law.omega, 0.0
     assert law.period is not None
-    frequency = 4 * HALF_PI / Fraction(law.period)
-    high = float(frequency)
-    return high, float(frequency - Fraction(high))
+    high, low = split(4 * HALF_PI / Fraction(law.period))
+    return high, low
 
 
 def _row(law: Law) -> list[float]:
@@ -95,7 +94,7 @@ def _row(law: Law) -> list[float]:
         n = max(len(law.cos), len(law.sin))
         cos = list(law.cos) + [0.0] * (n - len(law.cos))
         sin = list(law.sin) + [0.0] * (n - len(law.sin))
-        return [FOURIER, law.mean, _omega(law)[0], float(n), *cos, *sin]
+        return [FOURIER, law.mean, _omega(law)[0], n, *cos, *sin]
     if isinstance(law, BangBang) and not is_constant(law):
         times = [knot[0] for knot in law.knots]
         values = [knot[1] for knot in law.knots]
@@ -103,19 +102,9 @@ def _row(law: Law) -> list[float]:
             4 * (Fraction(v1) - Fraction(v0)) / (Fraction(t1) - Fraction(t0)) ** 2
             for (t0, v0), (t1, v1) in pairwise(law.knots)
         ] + [Fraction(0)]  # one for every knot keeps the columns simple
-        highs = [float(a) for a in accelerations]
-        period = Fraction(times[-1]) - Fraction(times[0])
-        return [
-            BANG_BANG,
-            0.0,
-            float(period),
-            float(len(times)),
-            float(period - Fraction(float(period))),
-            *times,
-            *values,
-            *highs,
-            *(float(a - Fraction(high)) for a, high in zip(accelerations, highs, strict=True)),
-        ]
+        highs, lows = zip(*map(split, accelerations), strict=True)
+        period, period_low = split(Fraction(times[-1]) - Fraction(times[0]))
+        return [BANG_BANG, 0.0, period, len(times), period_low, *times, *values, *highs, *lows]
     constant = law if isinstance(law, float) else law.mean if isinstance(law, Fourier) else law.knots[0][1]
     return [CONSTANT, constant, 0.0, 0.0]
 

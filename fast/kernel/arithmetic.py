@@ -197,14 +197,16 @@ QUARTER_TURN, QUARTER_TURN_LOW = math.pi / 2, 6.123233995736766e-17  # pi/2 as t
 
 
 @kept(error_model="numpy")
-def directions(turns, out):
-    """Fill out (n, 2) with cosine and sine of whole turns; no libm, hence the same everywhere."""
+def directions(turns):
+    """Return (n, 2) unit vectors at whole turns from the x axis; no libm, hence the same everywhere."""
+    out = np.empty((turns.shape[0], 2))
     for i in range(turns.shape[0]):
         s, _, c, _, _ = sine_cosine(4.0 * turns[i], 0.0, 1.0, QUARTER_TURN, QUARTER_TURN_LOW)
         out[i, 0], out[i, 1] = c, s
+    return out
 
 
-def _parts(number: Fraction, n: int) -> list[float]:
+def split(number: Fraction, n: int = 2) -> list[float]:
     """Split a number into n floats, each the nearest to what is left."""
     found = []
     for _ in range(n):
@@ -220,9 +222,9 @@ def half_pi() -> Fraction:
     return Fraction(*map(int, (ctx.pi / 2).as_integer_ratio()))
 
 
-HALF_PI = np.array(_parts(half_pi(), 4))
+HALF_PI = np.array(split(half_pi(), 4))
 # 1 / n! with the series' signs: of sin in odd rows, of cos in even ones.
-TERMS = np.array([_parts(Fraction((-1) ** (n // 2), math.factorial(n)), 2) for n in range(2 * N_TERMS)])
+TERMS = np.array([split(Fraction((-1) ** (n // 2), math.factorial(n))) for n in range(2 * N_TERMS)])
 
 
 @kernel

@@ -56,12 +56,10 @@ def unpack_scene(numbers):
     )
 
 
+@kernel
 def static_time(length, speed):
     """Return the exponent of a static table's unit of time, for a state of this speed; see fast.units."""
     return length + LENGTH - TIME - (math.frexp(speed)[1] - 1) if speed > 0.0 else 0
-
-
-static_time_inside = kernel(static_time)
 
 
 @kernel
@@ -119,7 +117,7 @@ def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
         there is neither.
     """
     length = int(numbers[2])
-    time = static_time_inside(length, max(abs(vx), abs(vy))) if np.isnan(numbers[3]) else int(numbers[3])
+    time = static_time(length, max(abs(vx), abs(vy))) if np.isnan(numbers[3]) else int(numbers[3])
     is_good, particle, end = question(length, time, t, x, y, vx, vy, wall, t_end)
     if not is_good:
         return REFUSED, 0.0, t, x, y, vx, vy

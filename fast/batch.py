@@ -25,12 +25,12 @@ from fast.kernel.records import (  # isort: skip
     write_state,
 )  # fmt: skip
 
+from fast.ensemble import only_stop
 from fast.kernel.scalar_step import KNOWN
 from fast.kernel.walls import wall_residual
 from fast.kernel.worker import DISK, GENERAL, careful_at, new_worker, run_careful
 from fast.paths import FineTrajectory, as_trajectory, carry, fill_fine_path
 from fast.pieces import laws_in_lanes
-from fast.starts import only_stop
 from fast.step import WALL_NAMES, as_arrays, end_of_path, fitted_start
 from fast.units import compile_scene, fit, outward
 from scene import Collision, Outcome, Scene, State

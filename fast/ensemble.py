@@ -3,6 +3,9 @@
 The results of a particle depend on that particle alone. They have the same bits for any number
 of particles, threads or chunks.
 An ensemble can be continued: some cycles now and more later, with the bits of a single run.
+
+Particle i draws its start from block i of a counter-based random stream (Philox) keyed by the seed: it is the
+same particle whatever the number of particles, threads or chunks.
 """
 
 from __future__ import annotations
@@ -15,22 +18,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from mpmath import fp
 
 from fast.kernel import records
+from fast.kernel.arithmetic import directions
 from fast.kernel.follow import LANE_ROWS, follow_particles
 from fast.kernel.records import FloatArray, Followed, IntArray, LawsInLanes, Stops, unfilled_ends
 from fast.kernel.single import LARGEST
 from fast.kernel.worker import awaited, interruptible, is_known_throughout, new_worker
 from fast.pieces import laws_in_lanes
-from fast.starts import cycle_stops, initial_states, least_collisions, one_cycle
 from fast.units import Units, fit, inward, outward
 
 from fast.validation import (  # isort: skip
-    MAX_CYCLES, MAX_FIRST, MAX_PARTICLES, MOST_IN_CYCLES, check_kept, check_energy, check_phases,
-    check_progress, check_threads,
+    MAX_CYCLES, MAX_FIRST, MAX_PARTICLES, MOST_IN_CYCLES, MOST_TO_A_TIME, check_energy, check_kept,
+    check_phases, check_progress, check_threads,
 )  # fmt: skip
 from scene import Scene, check_scene
-from scene.mouth import mouth_minima
+from scene.geometry import table_at
+from scene.laws import bounds
+from scene.mouth import mouth_minima, start_time
 from scene.notebook import rows
 from scene.refusal import BadInput, check_count, shown
 from scene.tables import laws
@@ -210,6 +216,87 @@ def simulate(
     return plan.ensemble(done, seconds)
 
 
+def initial_states(scene: Scene, n_particles: int, energy: float, seed: int, first: int = 0) -> FloatArray:
+    """Draw states uniform in area and direction when the cycle begins, all of one energy.
+
+    Returns:
+        (N, 6) array: t, its low part 0, x, y, vx, vy of particles `first` to `first` + N - 1.
+    """
+    # One Philox block gives four numbers, and four is what a particle needs.
+    raw = np.random.Philox(key=seed, counter=first).random_raw(4 * n_particles).reshape(n_particles, 4)
+    u = (raw >> np.uint64(11)).astype(np.float64) * 2.0**-53
+    start = start_time(scene)
+    x, y = _uniform_in_area(scene, start, u[:, 0], u[:, 1], u[:, 2])
+    speed, along = math.sqrt(2.0 * energy), directions(np.ascontiguousarray(u[:, 3]))
+    out: FloatArray = np.column_stack(
+        [np.full(n_particles, start), np.zeros(n_particles), x, y, speed * along[:, 0], speed * along[:, 1]]
+    )
+    return out
+
+
+def _uniform_in_area(
+    scene: Scene, t: float, pick: FloatArray, a: FloatArray, b: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    now = table_at(fp, scene, t)
+    cap_area, stem_area = now.cap_area(), now.stem_area()
+    rho, along = now.r * np.sqrt(a), directions(0.5 * b)
+    side, depth = now.uniform_in_stem(a, b)
+    in_cap = pick * (cap_area + stem_area) < cap_area
+    return np.where(in_cap, rho * along[:, 0], side), np.where(in_cap, rho * along[:, 1], -depth)
+
+
+def one_cycle(scene: Scene) -> float:
+    """Return how long a cycle takes [time]: the period of the laws, 1 for a static scene."""
+    return scene.period or 1.0
+
+
+def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
+    """Return the stops of whole cycles: at each of `phases` (fractions of a cycle, rising) and the end.
+
+    The minima of nu are stops too; one at the end of a cycle comes before that end.
+    """
+    start, span = start_time(scene), one_cycle(scene)
+    count = np.arange(n_cycles)
+    narrow = np.array(mouth_minima(scene))
+    parts = np.array([*narrow, *phases, 1.0])
+    columns = np.full((n_cycles, len(parts)), -1)
+    columns[:, len(narrow) :] = np.arange(n_cycles * (len(phases) + 1)).reshape(n_cycles, -1)
+    cycles = np.full(columns.shape, -1)
+    cycles[:, -1] = count
+    order = np.argsort(parts, kind="stable")
+    times = start + span * (count[:, None] + parts[None, :])
+    return Stops(
+        times[:, order].ravel(),
+        columns[:, order].ravel(),
+        cycles[:, order].ravel(),
+        np.ascontiguousarray(times[:, : len(narrow)]),  # a slice would have `follow` compiled once more
+        is_first_kept=False,
+        most=MOST_IN_CYCLES,
+        called_off=np.zeros(1, np.int64),
+    )
+
+
+def only_stop(t_end: float) -> Stops:
+    """Return one stop, that keeps the first capture interval of any length."""
+    return Stops(
+        np.array([t_end]),
+        np.array([0]),
+        np.array([0]),
+        np.full((1, 1), math.nan),
+        is_first_kept=True,
+        most=MOST_TO_A_TIME,
+        called_off=np.zeros(1, np.int64),
+    )
+
+
+def least_collisions(scene: Scene, speed: float, span: float) -> float:
+    """Return how many flights of the table's full length fit into a path at this speed [collisions]."""
+    found = {name: bounds(law).highest for name, law in laws(scene).items() if name != "slope"}
+    r, h = found.get("r", 0.0), found.get("h", 0.0)
+    w = found.get("w", found.get("nu", 0.0) * r)
+    return speed * span / (2.0 * max(r, w) + r + h)
+
+
 class Plan(NamedTuple):
     """What an ensemble is asked for, checked, as the kernel takes it.
 
@@ -256,7 +343,7 @@ class Plan(NamedTuple):
         if lanes is not None:
             done.lanes[:] = lanes
         free, in_lanes = np.full(len(states), records.NO_WALL), laws_in_lanes(self.scene)
-        return done, follow(in_lanes, done, free, self.stops, self.threads, self.progress, n_passed)
+        return done, follow_many(in_lanes, done, free, self.stops, self.threads, self.progress, n_passed)
 
     def ensemble(self, done: Followed, seconds: float) -> Ensemble:
         """Name what the kernel filled in for some particles."""
@@ -346,7 +433,7 @@ def outcomes(ends: IntArray) -> npt.NDArray[np.int8]:
     return np.select(kinds, [FOLLOWED, UNDEFINED, UNDECIDED], REJECTED).astype(np.int8)
 
 
-def follow(
+def follow_many(
     in_lanes: LawsInLanes,
     followed: Followed,
     walls: IntArray,

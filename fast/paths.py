@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from fast import ensemble
+from fast.ensemble import follow_many, least_collisions, only_stop
 from fast.kernel import records
 from fast.kernel.fine_step import FineState, fine_path
 from fast.kernel.follow import PATHS
@@ -27,7 +27,6 @@ from fast.kernel.records import ANCHORS_SHAPE, FloatArray, IntArray, unfilled_en
 from fast.kernel.single import ANSWER_LOST
 from fast.kernel.worker import Loops, careful_at, follow_path, new_worker
 from fast.pieces import laws_in_lanes
-from fast.starts import least_collisions, only_stop
 
 from fast.step import (  # isort: skip
     WALL_NAMES, Start, as_arrays, end_of_path, fitted_start, next_collision, start_at,
@@ -369,7 +368,7 @@ def carry(
         rows, walls = as_arrays([starts[i] for i in those])
         done = unfilled_ends(rows, 1, (1, 1))
         stop = only_stop(units.horizon(t_end))
-        seconds += ensemble.follow(laws_in_lanes(fit(scene).scene), done, walls, stop, threads)
+        seconds += follow_many(laws_in_lanes(fit(scene).scene), done, walls, stop, threads)
         # t, its low part, x, y, vx, vy; begin and end of the capture interval
         numbers = np.column_stack([done.states, done.t_in[:, 0, 0], done.t_out[:, 0, 0]])
         numbers, is_kept = scaled(numbers, np.append(units.of_step(), [units.time, units.time]))

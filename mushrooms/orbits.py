@@ -23,8 +23,8 @@ import fast
 import scene as scenes
 import theory
 from conformance.files import write_file
+from fast.ensemble import initial_states
 from fast.paths import captured, sin_phi
-from fast.starts import initial_states
 from fast.validation import check_energy
 from mushrooms.output import TABLES, check_file
 from scene import Outcome, Scene, State, Stem, Wall, check_scene

@@ -17,7 +17,7 @@ from rich.progress import Progress
 import fast
 from conformance.audit.runs import scene_named
 from conformance.files import named, write_file
-from fast.starts import one_cycle
+from fast.ensemble import one_cycle
 from fast.validation import check_phases
 from mushrooms.output import (
     Watch,

@@ -8,7 +8,7 @@ from mpmath import fp
 from scipy import stats
 
 import fast
-from fast.starts import initial_states
+from fast.ensemble import initial_states
 from scene import BadInput, State, load
 from scene.geometry import table_at
 

@@ -7,8 +7,8 @@ import pytest
 from mpmath import fp
 
 import fast
-from fast import starts
-from fast.ensemble import UNDECIDED
+from fast import ensemble
+from fast.ensemble import UNDECIDED, initial_states
 from scene import (
     BadInput,
     BangBang,
@@ -43,14 +43,14 @@ def ends(scene, state, t_end, flow=flow_of):
 def test_who_gathers_speed_for_ever_is_given_up(monkeypatch):
     """The first speed says little of how many collisions are to come: they are counted."""
     start, most = State(0.0, 0.1, 0.2, 3.0, 4.0), 500
-    monkeypatch.setattr(starts, "MOST_TO_A_TIME", most)
-    monkeypatch.setattr(starts, "MOST_IN_CYCLES", most)
+    monkeypatch.setattr(ensemble, "MOST_TO_A_TIME", most)
+    monkeypatch.setattr(ensemble, "MOST_IN_CYCLES", most)
     run = fast.flow(SCENE, [start, STARTS[0]], 400.0)
     assert run.outcomes == [Undecided("t_end is over 1e+07 collisions away")] * 2
     assert all(most < n < 10 * most for n in run.wall_counts.sum(axis=1))
     assert isinstance(fast.flow(SCENE, [start], 20.0).outcomes[0], Horizon)
-    ensemble = fast.simulate(SCENE, n_particles=4, energy=12.5, n_cycles=60, seed=1)
-    assert ensemble.outcome.tolist() == [UNDECIDED] * 4
+    run = fast.simulate(SCENE, n_particles=4, energy=12.5, n_cycles=60, seed=1)
+    assert run.outcome.tolist() == [UNDECIDED] * 4
     # Captured ones are unfolded: they are given up where they are in the table, all the same.
     for name in ("breathing-circle", "moving-cap"):
         scene = load(name)
@@ -157,7 +157,7 @@ def test_nothing_to_follow():
 
 
 def drawn(n, energy):
-    return [State(t, *place) for t, _, *place in starts.initial_states(SCENE, n, energy, 3).tolist()]
+    return [State(t, *place) for t, _, *place in initial_states(SCENE, n, energy, 3).tolist()]
 
 
 def test_captures_and_releases_are_those_of_a_flow():

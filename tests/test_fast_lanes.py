@@ -17,6 +17,7 @@ from support.depth import deep_but
 
 import fast
 from fast.batch import take_careful_steps
+from fast.ensemble import initial_states
 from fast.kernel import worker
 from fast.kernel.compiling import HOW, TOOLS
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
@@ -24,7 +25,6 @@ from fast.kernel.lanes import chord, fly
 from fast.kernel.records import LANES, POOL_SIZE, TableOfLanes
 from fast.kernel.worker import CACHE_LINE, LawLimits, new_pools
 from fast.pieces import PARABOLA, SERIES
-from fast.starts import initial_states
 from fast.step import WALL_CODES
 from fast.units import compile_scene
 from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, load

@@ -11,9 +11,9 @@ from support.lane_anywhere import draw_scene
 
 import fast
 from fast import ensemble, pieces
+from fast.ensemble import one_cycle
 from fast.kernel import follow
 from fast.kernel.arithmetic import MAX_QUADRANT
-from fast.starts import one_cycle
 from fast.units import Units, fit
 from scene import BadInput, BangBang, Cap, Fourier, Mushroom, load
 

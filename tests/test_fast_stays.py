@@ -14,8 +14,8 @@ from support.depth import deep_but
 
 import fast
 import theory
-from fast import starts
-from fast.starts import initial_states, one_cycle
+from fast import ensemble
+from fast.ensemble import initial_states, one_cycle
 from scene import BangBang, Fourier, Mushroom, State, load
 from scene.laws import value
 from scene.mouth import mouth_minima, start_time
@@ -165,7 +165,7 @@ WRONG = {
 @pytest.mark.parametrize("name", deep_but(["equal", "plateaus"], "equal"))
 def test_other_stays_give_another_p_nc(name, mutant, monkeypatch):
     scene = MOUTHS[name]
-    monkeypatch.setattr(starts, "mouth_minima", lambda scene: WRONG[mutant](mouth_minima(scene)))
+    monkeypatch.setattr(ensemble, "mouth_minima", lambda scene: WRONG[mutant](mouth_minima(scene)))
     z, error = z_score(fast.simulate(scene, n_particles=N, energy=ENERGY[name], seed=1), scene)
     assert abs(z) > 4 + BIAS[name] / error
 

@@ -11,8 +11,7 @@ import numpy.typing as npt
 from mpmath import fp
 
 import theory
-from fast.ensemble import FOLLOWED, UNDECIDED
-from fast.starts import one_cycle
+from fast.ensemble import FOLLOWED, UNDECIDED, one_cycle
 from mushrooms.store.spec import RunSpec
 from scene import BadInput, Cap, Mushroom, Scene, Stem
 from scene.geometry import table_at

@@ -119,7 +119,7 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
         The outcomes, and the seconds that n_times N steps took.
     """
     starts = [fitted_start(scene, state) for state in states]
-    rows, walls = as_arrays(starts)
+    rows, walls = as_arrays([particle for particle, _ in starts])
     compiled = fit(scene).compiled
     take_careful_steps(compiled, rows[:0], walls[:0])  # compiles, or loads from the cache
     begin = time.perf_counter()
@@ -127,9 +127,9 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
     seconds = time.perf_counter() - begin
     outcomes: list[Outcome] = []
     steps = np.column_stack([times, np.delete(ends, 1, axis=1)])
-    for state, start, code, row in zip(states, starts, codes.tolist(), steps, strict=True):
+    for state, (_, units), code, row in zip(states, starts, codes.tolist(), steps, strict=True):
         if code in WALL_NAMES:
-            outcomes.append(Collision(WALL_NAMES[code], *outward(row, start.units.of_step()).tolist()))
+            outcomes.append(Collision(WALL_NAMES[code], *outward(row, units.of_step()).tolist()))
         else:  # without a horizon only what never moves meets no wall
             place = np.array([state.x, state.y, state.vx, state.vy])
             outcomes.append(end_of_path(code, scene, state, 0, np.inf, place))
@@ -140,13 +140,14 @@ def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple
     """Take a fine step from each of N states, a call of compiled code for each; as `careful_steps`."""
     starts = [fitted_start(scene, state) for state in states]
     steps, met = np.empty((len(states), 1, 6, 2)), np.empty((len(states), 1), dtype=np.int64)
-    questions = list(zip(starts, steps, met, strict=True))
+    compiled, particles = fit(scene).compiled, [particle for particle, _ in starts]
+    questions = [(compiled, *question) for question in zip(particles, steps, met, strict=True)]
     ends = [fill_fine_path(*question) for question in questions[:1]]  # compiles, or loads
     begin = time.perf_counter()
     for _ in range(n_times):
         ends = [fill_fine_path(*question) for question in questions]
     seconds = time.perf_counter() - begin
-    paths = zip(states, starts, ends, steps, met, strict=True)
+    paths = zip(states, (units for _, units in starts), ends, steps, met, strict=True)
     return [as_trajectory(scene, *path) for path in paths], seconds
 
 
@@ -224,16 +225,16 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
     for first in range(0, len(states), records.LANES):
         part = states[first : first + records.LANES]
         starts, are_met = [fitted_start(scene, state) for state in part], []
-        for i, (p, wall) in enumerate(zip(*as_arrays(starts), strict=True)):
+        for i, (p, wall) in enumerate(zip(*as_arrays([particle for particle, _ in starts]), strict=True)):
             pool.fill(i, p, wall)
             are_met.append(pool.is_met(p, wall))
-        for state, start, is_met, is_right, hit, row in zip(
+        for state, (particle, units), is_met, is_right, hit, row in zip(
             part, starts, are_met, *pool.step(len(part)), strict=True
         ):
             is_folded = pool.is_disk and (row[2] < 0.0 or state.wall == "base")
             if not is_right or is_folded or not is_met:
                 found.append(None)
                 continue
-            numbers = outward(np.array([row[0], start.particle.t + row[0], *row[1:]]), start.units.of_step())
+            numbers = outward(np.array([row[0], particle.t + row[0], *row[1:]]), units.of_step())
             found.append(Collision(WALL_NAMES[int(hit)], *numbers.tolist()))
     return found

@@ -303,7 +303,6 @@ class Plan(NamedTuple):
     Attributes:
         scene, units: the scene in the kernel's units, and these.
         energy0: of every particle, as given.
-        energy: the same in the kernel's units.
         size: particles, cycles, looks at a particle in a cycle.
         seed, first, threads, progress: see `simulate`.
         stops: when particles are looked at.
@@ -312,7 +311,6 @@ class Plan(NamedTuple):
     scene: Scene
     units: Units
     energy0: float
-    energy: float
     size: tuple[int, int, int]
     seed: int
     first: int
@@ -322,7 +320,8 @@ class Plan(NamedTuple):
 
     def starts(self) -> FloatArray:
         """Return the states that particles start from."""
-        return initial_states(self.scene, self.size[0], self.energy, self.seed, self.first)
+        energy = inward("energy", self.energy0, self.units.of_energy())
+        return initial_states(self.scene, self.size[0], energy, self.seed, self.first)
 
     def followed(
         self, states: FloatArray, n_lane_rows: int = 0, lanes: FloatArray | None = None, n_passed: int = 0
@@ -414,7 +413,7 @@ def planned(
             f"energy = {energy}: the speed must be at least 2^-400 beside the table's size and period"
         )
     size, stops = (n_particles, n_cycles, len(phases) + 1), cycle_stops(scene, n_cycles, phases)
-    return Plan(scene, units, energy, 0.5 * speed2, size, seed, first, threads, progress, stops)
+    return Plan(scene, units, energy, size, seed, first, threads, progress, stops)
 
 
 def _share(n: int, threads: int, n_cycles: int) -> int:

@@ -23,15 +23,15 @@ from fast.ensemble import follow_many, least_collisions, only_stop
 from fast.kernel import records
 from fast.kernel.fine_step import FineState, fine_path
 from fast.kernel.follow import PATHS
-from fast.kernel.records import ANCHORS_SHAPE, FloatArray, IntArray, unfilled_ends
+from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, unfilled_ends
 from fast.kernel.single import ANSWER_LOST
 from fast.kernel.worker import Loops, careful_at, follow_path, new_worker
 from fast.pieces import laws_in_lanes
 
 from fast.step import (  # isort: skip
-    WALL_NAMES, Start, as_arrays, end_of_path, fitted_start, next_collision, start_at,
+    WALL_NAMES, as_arrays, end_of_path, fitted_start, next_collision, start_at,
 )  # fmt: skip
-from fast.units import LateTime, fit, scaled
+from fast.units import LateTime, Units, fit, scaled
 
 from fast.validation import (  # isort: skip
     MAX_STEPS, MOST_TO_A_TIME, check_end, check_energy, check_states, check_threads,
@@ -81,12 +81,12 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     t_end = check_end(t_end)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
     try:
-        start = start_at(scene, state, min(t_end, sys.float_info.max))
+        start, units = start_at(scene, state, min(t_end, sys.float_info.max))
     except LateTime as error:
         return Collisions([], np.empty((0, 6)), Undecided(str(error)))
-    in_lanes, exponents = laws_in_lanes(fit(scene).scene), start.units.of_step()
+    in_lanes, exponents = laws_in_lanes(fit(scene).scene), units.of_step()
     rows, (wall,) = as_arrays([start])
-    stop = only_stop(start.units.horizon(t_end))
+    stop = only_stop(units.horizon(t_end))
     worker = new_worker(in_lanes, stop, unfilled_ends(rows, 1, (1, 1)), loops=Loops(careful_at(), 0, 0))
     # Steps are brought back in passing: a pass of its own took a quarter of the time.
     halves = np.stack([exponents // 2, exponents - exponents // 2])
@@ -157,29 +157,29 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
     check_scene(scene)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
     try:
-        start = start_at(scene, state)
+        start, units = start_at(scene, state)
     except LateTime as error:
         return FineTrajectory([], np.empty((0, 6, 2)), Undecided(str(error)))
     steps, walls = np.empty((n_collisions, 6, 2)), np.empty(n_collisions, dtype=np.int64)
-    end = fill_fine_path(start, steps, walls)
-    return as_trajectory(scene, state, start, end, steps, walls)
+    end = fill_fine_path(fit(scene).compiled, start, steps, walls)
+    return as_trajectory(scene, state, units, end, steps, walls)
 
 
-def fill_fine_path(start: Start, steps: FloatArray, walls: IntArray) -> tuple[int, int]:
+def fill_fine_path(compiled: Compiled, p: Particle, steps: FloatArray, walls: IntArray) -> tuple[int, int]:
     """Fill in steps and walls met, in the kernel's units; returns number of collisions and last code."""
-    p, called_off = start.particle, np.zeros(1, np.int64)
+    called_off = np.zeros(1, np.int64)
     fine = FineState(*((number, 0.0) for number in (p.t, p.x, p.y, p.vx, p.vy)))
-    given = (start.compiled, np.zeros(ANCHORS_SHAPE), fine, p.wall, steps, walls, called_off)
+    given = (compiled, np.zeros(ANCHORS_SHAPE), fine, p.wall, steps, walls, called_off)
     found: tuple[int, int] = follow_path(fine_path, given, len(steps), called_off)
     return found
 
 
 def as_trajectory(
-    scene: Scene, state: State, start: Start, end: tuple[int, int], steps: FloatArray, walls: IntArray
+    scene: Scene, state: State, units: Units, end: tuple[int, int], steps: FloatArray, walls: IntArray
 ) -> FineTrajectory:
     """Return what the kernel found: some collisions of those asked for, and its last code."""
     n, code = end
-    found, is_kept = scaled(steps[:n], start.units.of_step()[:, None])
+    found, is_kept = scaled(steps[:n], units.of_step()[:, None])
     n_exact = int(np.append(is_kept.all(axis=(1, 2)), False).argmin())
     if n_exact < n:
         n, code = n_exact, ANSWER_LOST
@@ -363,9 +363,9 @@ def carry(
     """
     starts = {i: fitted_start(scene, states[i]) for i, refusal in enumerate(refusals) if refusal is None}
     every, outcomes, seconds = unfilled_ends(np.empty((len(states), 6)), 1, (1, 1)), list(refusals), 0.0
-    for units in sorted({start.units for start in starts.values()}):
-        those = [i for i, start in starts.items() if start.units == units]
-        rows, walls = as_arrays([starts[i] for i in those])
+    for units in sorted({units for _, units in starts.values()}):
+        those = [i for i, start in starts.items() if start[1] == units]
+        rows, walls = as_arrays([starts[i][0] for i in those])
         done = unfilled_ends(rows, 1, (1, 1))
         stop = only_stop(units.horizon(t_end))
         seconds += follow_many(laws_in_lanes(fit(scene).scene), done, walls, stop, threads)
@@ -389,9 +389,8 @@ def refuse(scene: Scene, state: State, t_end: float) -> Rejected | Undecided | N
     outcome = next_collision(scene, state, t_end)
     if isinstance(outcome, Rejected | Undecided):
         return outcome
-    start = fitted_start(scene, state)
-    p = start.particle
-    ahead = least_collisions(fit(scene).scene, math.hypot(p.vx, p.vy), start.units.horizon(t_end) - p.t)
+    p, units = fitted_start(scene, state)
+    ahead = least_collisions(fit(scene).scene, math.hypot(p.vx, p.vy), units.horizon(t_end) - p.t)
     if ahead > MOST_TO_A_TIME:
         return Undecided(f"t_end = {t_end!r} is over {ahead:.0e} collisions away, must be at most 1e7")
     return None

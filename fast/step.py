@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from fast.kernel import records, scalar_step, single
-from fast.kernel.records import Compiled, FloatArray, IntArray, Particle
+from fast.kernel.records import FloatArray, IntArray, Particle
 from fast.kernel.worker import careful_at
 from fast.units import ANSWER_LOST, LateTime, Units, fit
 from fast.validation import MOST_TO_A_TIME
@@ -81,7 +80,7 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         ask, numbers = single.single_at_once(), fit(scene).packed
         code, dt, t, x, y, vx, vy = ask(careful_at(), numbers, t, x, y, vx, vy, wall, t_end)
         if code == single.REFUSED:  # by checks in compiled code: those that follow say why
-            start_at(scene, state, t_end).units.horizon(t_end)
+            start_at(scene, state, t_end)[1].horizon(t_end)
     except LateTime as error:
         return Undecided(str(error))
     except BadInput as error:
@@ -101,27 +100,13 @@ def is_plain(scene: Scene, state: State, t_end: float) -> bool:
     )
 
 
-class Start(NamedTuple):
-    """A state in the kernel's units, with what leads there and back.
-
-    Attributes:
-        particle: in the kernel's units.
-        units: those.
-        compiled: the scene's numbers in them.
-    """
-
-    particle: Particle
-    units: Units
-    compiled: Compiled
-
-
-def start_at(scene: Scene, state: State, t_end: float = sys.float_info.max) -> Start:
+def start_at(scene: Scene, state: State, t_end: float = sys.float_info.max) -> tuple[Particle, Units]:
     """Return a state in the kernel's units; refuse what this stepper cannot hold, naming field and bound."""
     return fitted_start(scene, check_numbers(scene, state, t_end))
 
 
-def fitted_start(scene: Scene, state: State) -> Start:
-    """Return a state that has been checked, in the kernel's units.
+def fitted_start(scene: Scene, state: State) -> tuple[Particle, Units]:
+    """Return a state that has been checked, in the kernel's units, and these.
 
     Raises:
         BadInput: scene or state do not fit, or the state is not on the wall that it names.
@@ -135,13 +120,13 @@ def fitted_start(scene: Scene, state: State) -> Start:
         if share:
             away = f"{share:.3g} of that wall's size"
             raise InvalidState(f"state.wall = {state.wall!r}, but the state is {away} away from that wall")
-    return Start(particle, units, fitted.compiled)
+    return particle, units
 
 
-def as_arrays(starts: Sequence[Start]) -> tuple[FloatArray, IntArray]:
+def as_arrays(starts: Sequence[Particle]) -> tuple[FloatArray, IntArray]:
     """Return N states as the kernels take them: (N, 6) t, its low part, x, y, vx, vy; (N,) codes of walls."""
-    rows = np.array([start.particle[:6] for start in starts]).reshape(-1, 6)
-    return rows, np.array([start.particle.wall for start in starts], dtype=np.int64)
+    rows = np.array([start[:6] for start in starts]).reshape(-1, 6)
+    return rows, np.array([start.wall for start in starts], dtype=np.int64)
 
 
 TOO_LATE = (

@@ -158,14 +158,14 @@ MUTANTS = {
     "what a hop hangs on": (
         "early hop",
         1500,
-        "known = min(known, told_rate(r, sizes, limits))",
-        "known = known + 0.0",
+        "return f, rate, sizes, min(known, told)",
+        "return f, rate, sizes, known",
     ),
     "what a hop through the base hangs on": (
         "early hop through the base",
         1500,
-        "quality = min(quality, told_rate(r, sizes, limits))",
-        "quality = min(quality, 1.0)",
+        "return f, rate, sizes, min(known, told)",
+        "return f, rate, sizes, known",
     ),
     "how far the series of a hop's turn serve": (
         "early hop",

@@ -22,7 +22,7 @@ from fast.kernel import worker
 from fast.kernel.compiling import HOW, TOOLS
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
-from fast.kernel.records import LANES, POOL_SIZE, TableOfLanes
+from fast.kernel.records import LANES, MUSHROOM, POOL_SIZE, Compiled
 from fast.kernel.worker import CACHE_LINE, LawLimits, new_pools
 from fast.pieces import PARABOLA, SERIES
 from fast.step import WALL_CODES
@@ -57,11 +57,11 @@ def test_the_compiler_packs_divisions_and_square_roots(loop, form, is_slope_movi
 def test_the_width_of_registers_changes_no_bit(step):
     less = {**step.__globals__, "widest_registers": njit(lambda: None)}
     limits, waves = LawLimits(*np.ones(8)), NO_WAVES._replace(omega=0.5, r=(1.0, 0.1, 0.2, 0.0, 0.0))
-    pools, texts = [], []
+    table, pools, texts = Compiled(int(MUSHROOM), True, np.zeros((5, 5)), np.zeros((4, 4))), [], []
     for each in (step, FunctionType(step.__code__, less)):
         pool = np.random.default_rng(1).uniform(0.5, 2.0, POOL_SIZE)
         compiled = njit(**HOW)(each)
-        compiled(pool, LANES, TableOfLanes(False, True, False, True), waves, 0.125, (0,), limits)
+        compiled(pool, LANES, table, waves, 0.125, (0,), limits)
         pools.append(pool.tobytes())
         texts.append(compiled.inspect_asm(compiled.signatures[0]))
     assert pools[0] == pools[1]

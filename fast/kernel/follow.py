@@ -30,14 +30,14 @@ from fast.kernel.lane_laws import (  # isort: skip
 )  # fmt: skip
 from fast.kernel.lanes import (  # isort: skip
     ONE, arc_quotient, count_hit, cube_of_arc, land, mouth_crossing, nearest_below, outset_of, side_bend,
-    side_curvature, side_rate, stay_after,
+    side_curvature, stay_after,
 )  # fmt: skip
 from fast.kernel.records import (  # isort: skip
-    ANEW, ARC, AS_GIVEN, CAPTURED, CLEARLY, COARSE, END, FAR, FATE, HIT, HORIZON, LANES, LATE, MARKED,
-    MAX_CORRECTIONS, MOVED, NEVER, NOT_YET, N_ARC, N_BASE, N_ROWS, N_WALLS, ON_ARC, ON_BASE, ON_FLOOR,
-    ON_LEFT, ON_RIGHT, OVER, PIECE, R0, R1, RADIUS, REF, S, SINCE, SPIN, STAY, STAY_IN, STAY_OUT, STOP,
-    STRIDE, SURE, T, TOO_FAR, TRIES, T_LOW, UNTIL, VALUE, VX, VY, W0_LOW, WALL, WHEN, WIDTH, X, Y,
-    Particle, TableOfLanes, change_lane, load, particle_at, particle_of, put_particle, refold,
+    ANEW, ARC, AS_GIVEN, CAP, CAPTURED, CLEARLY, COARSE, END, FAR, FATE, HIT, HORIZON, LANES, LATE, LAWS,
+    MARKED, MAX_CORRECTIONS, MOVED, MUSHROOM, NEVER, NOT_YET, N_ARC, N_BASE, N_ROWS, N_WALLS, ON_ARC,
+    ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, OVER, PIECE, POOL_SIZE, R0, R1, RADIUS, REF, S, SINCE, SPIN, STAY,
+    STAY_IN, STAY_OUT, STEM, STOP, STRIDE, SURE, T, TOO_FAR, TRIES, T_LOW, UNTIL, VALUE, VX, VY, W0_LOW,
+    WALL, WHEN, WIDTH, X, Y, Particle, copy_rows, load, particle_at, particle_of, put_particle, refold,
     whole_registers, write_state, write_step,
 )  # fmt: skip
 from fast.kernel.scalar_step import KNOWN, NEAR
@@ -167,7 +167,7 @@ def finish(pool, a, i, j, code, end, followed):
 def advance(pool, a, n, worker):
     """Take a step of the first n lanes of a pool, whole registers of them, where it is shown right."""
     loop = worker.loops.chord if pool == DISK else worker.loops.fly
-    run_step(loop, (a, n, worker.table, worker.waves, worker.slope, worker.limits))
+    run_step(loop, (a, n, worker.scene, worker.waves, worker.slope, worker.limits))
 
 
 @part
@@ -192,7 +192,7 @@ def land_carefully(pool, a, i, code, s, p, worker):
     scene, hit = worker.scene, float(code)
     if code != ARC or a[WALL + i] != ON_ARC:  # it has left the arc by now
         a[AS_GIVEN + i] = 0.0
-    if worker.table.is_mushroom:
+    if worker.scene.table == MUSHROOM:
         w, vx, vy = worker.anchors[WIDTH, VALUE], a[VX + i], a[VY + i]
         if scene.is_relative:
             w *= worker.anchors[RADIUS, VALUE]
@@ -308,7 +308,7 @@ def attend(pool, a, i, roster, worker):
         set_reference(a, i, t, a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
         if a[END + i] > -NEVER:
             return STAYS
-    if pool == DISK and worker.table.is_mushroom and not (knows and fate == LATE):
+    if pool == DISK and worker.scene.table == MUSHROOM and not (knows and fate == LATE):
         refold(a, i)
         a[WALL + i], a[TRIES + i] = ON_ARC, 0.0
         return MOVES
@@ -332,8 +332,9 @@ def last_to_attend(a, n):
 
 @part
 def change_place(worker, pool, i, other, j):
-    """Copy a lane and its entry in the roster to another place."""
-    change_lane(worker.pools[pool], i, worker.pools[other], j, worker.degree)
+    """Copy a lane and its entry in the roster to another place; without coefficients where laws are waves."""
+    last = POOL_SIZE if worker.degree % 2 == 0 else LAWS
+    copy_rows(worker.pools[pool], i, worker.pools[other], j, T, last)
     worker.rosters[other, PARTICLE, j] = worker.rosters[pool, PARTICLE, i]
     worker.rosters[other, NEXT_STOP, j] = worker.rosters[pool, NEXT_STOP, i]
 
@@ -358,7 +359,7 @@ def scan(pool, worker):
 @part
 def take_in(worker, j, wall):
     """Put a particle into the next lane: from its start, or as it was kept."""
-    n_held, home, followed = worker.n_held, DISK if worker.table.is_cap else GENERAL, worker.followed
+    n_held, home, followed = worker.n_held, DISK if worker.scene.table == CAP else GENERAL, worker.followed
     if worker.n_passed > 0 and not followed.lanes[j, 0] >= 0.0:
         followed.codes[j] = ANEW
         return
@@ -403,14 +404,6 @@ def follow_particles(worker, walls):
 FIRST = np.int64(0)  # the lane in use
 
 
-@part
-def side_ahead(outset, now, slope):
-    """Return the time to the nearest of right, left and floor as a quotient, and the wall."""
-    x, y, vx, vy, wall, _, _ = outset
-    edge, drift = fma(now.m, y, now.w), fma(now.m, vy, side_rate(y, now, slope))
-    return nearest_below(wall, edge - x, vx - drift, edge + x, -vx - drift, y + now.h, -vy - now.h1)
-
-
 @packed
 def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
     """Choose the wall and guess the time, as `aim` does; returns the wall."""
@@ -425,9 +418,9 @@ def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
         if vy < 0.0 and not fma(y, d, vy * f) > 0.0:
             gap, doubt = mouth_crossing(outset, now.w, now.w1, k_side, limits)
             sure, root = abs(gap * rise) - doubt, 1.0
-            f, d, hit = side_ahead(outset, now, slope) if gap > 0.0 else (depth, rise, ON_BASE)
+            f, d, hit = nearest_below(outset, now, slope) if gap > 0.0 else (depth, rise, ON_BASE)
     else:
-        f, d, hit = side_ahead(outset, now, slope)
+        f, d, hit = nearest_below(outset, now, slope)
         is_crossing = vy > 0.0 and not fma(depth, d, -f * vy) > 0.0
         if is_crossing and is_stem:
             f, d, hit = depth, rise, ON_BASE
@@ -452,7 +445,7 @@ def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
 def land_on(a, hit, is_stem, is_relative, waves, slope, degree, limits):
     """Take the step to a wall, if that is shown right; stays are of no interest."""
     a[HIT] = hit
-    land(a, FIRST, TableOfLanes(is_stem, False, False, is_relative), waves, slope, degree, limits)
+    land(a, FIRST, (is_stem, False, is_relative), waves, slope, degree, limits)
 
 
 @packed
@@ -481,9 +474,9 @@ def next_hit(a, worker, waves, slope, degree):
     """
     limit = (worker.stops.times[-1] - a[T]) - a[T_LOW]
     a[STOP] = min(a[T] + limit * (1.0 - 4.0 * NEAR), worker.pieces.until)
-    table = worker.table
+    is_stem, is_relative = worker.scene.table == STEM, worker.scene.is_relative
     while knows_laws(a, FIRST, worker):
-        fly_alone(a, table.is_stem, table.is_relative, waves, slope, degree, worker.limits)
+        fly_alone(a, is_stem, is_relative, waves, slope, degree, worker.limits)
         if a[FATE] == MOVED or a[FATE] == MARKED:
             if a[T] >= a[END]:
                 set_reference(a, FIRST, a[T], a[T_LOW], worker.scene, worker.pieces, worker.degree)

@@ -34,9 +34,9 @@ from fast.kernel.lane_laws import (
 )
 
 from fast.kernel.records import (  # isort: skip
-    AHEAD, CAPTURED, CLEARLY, COARSE, END, FAR, FATE, HIT, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER,
-    NOT_YET, N_ARC, N_BASE, N_FLOOR, N_LEFT, N_RIGHT, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, OVER,
-    R0, REFUSED, S, SPIN, STAY, STOP, SURE, T, TRIES, T_LOW, VX, VY, WALL, WHEN, X, Y, Place,
+    AHEAD, CAP, CAPTURED, CLEARLY, COARSE, END, FAR, FATE, HIT, LATE, MARKED, MAX_CORRECTIONS, MOVED,
+    MUSHROOM, NEVER, NOT_YET, N_ARC, N_BASE, N_WALLS, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, OVER,
+    R0, REFUSED, S, SPIN, STAY, STEM, STOP, STRIDE, SURE, T, TRIES, T_LOW, VX, VY, WALL, WHEN, X, Y, Place,
 )  # fmt: skip
 
 ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
@@ -103,18 +103,21 @@ def nearer(f, d, wall, other_f, other_d, other):
 
 
 @part
-def nearest_below(wall, f_r, d_r, f_l, d_l, f_f, d_f):
-    """Return the least quotient f / d of right, left and floor, by cross-multiplication, and its wall.
+def nearest_below(outset, now, slope):
+    """Return the time to the nearest of right, left and floor as a quotient f / d, and its wall.
 
     f is the wall's function, 0 on the wall being left, and d how fast it falls.
     """
-    f_r = 0.0 if wall == ON_RIGHT else f_r
-    f_l = 0.0 if wall == ON_LEFT else f_l
-    f_f = 0.0 if wall == ON_FLOOR else f_f
+    x, y, vx, vy, wall, _, _ = outset
+    edge, drift = fma(now.m, y, now.w), fma(now.m, vy, side_rate(y, now, slope))
+    f_r = 0.0 if wall == ON_RIGHT else edge - x
+    d_r = vx - drift
+    f_l = 0.0 if wall == ON_LEFT else edge + x
+    f_f = 0.0 if wall == ON_FLOOR else y + now.h
     f = f_r if f_r > 0.0 else 1.0
     d = d_r if f_r > 0.0 else 0.0
-    f, d, side = nearer(f, d if d > 0.0 else 0.0, ON_RIGHT, f_l, d_l, ON_LEFT)
-    return nearer(f, d, side, f_f, d_f, ON_FLOOR)
+    f, d, side = nearer(f, d if d > 0.0 else 0.0, ON_RIGHT, f_l, -vx - drift, ON_LEFT)
+    return nearer(f, d, side, f_f, -vy - now.h1, ON_FLOOR)
 
 
 @part
@@ -145,15 +148,14 @@ def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
     SURE is positive only where the part of the flight before y = 0 is as chosen: docs/lanes.md.
     """
     outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, degree)
-    x, y, vx, vy, wall, _, _ = outset
+    _, y, _, vy, wall, _, _ = outset
     depth, rise = abs(y), abs(vy)
     is_in_cap = 1.0 if wall < 1.5 else 0.0
     is_in_cap = 0.0 if is_stem else is_in_cap
     k_side = side_curvature(vy, slope, limits)
     k = k_side if is_in_cap > 0.5 else k_side + limits.lift
     gap, doubt = mouth_crossing(outset, now.w, now.w1, k, limits)
-    edge, drift = fma(now.m, y, now.w), fma(now.m, vy, side_rate(y, now, slope))
-    f, d, side = nearest_below(wall, edge - x, vx - drift, edge + x, -vx - drift, y + now.h, -vy - now.h1)
+    f, d, side = nearest_below(outset, now, slope)
     f_a, d_a, root = arc_quotient(outset, now.r, now.r1, now.r2)
     # Which of them, by the part of the table the flight is in and whether it crosses y = 0 before.
     reaches = fma(y, d_a, vy * f_a) if vy < 0.0 else 1.0  # cap: > 0 where the arc comes first
@@ -275,11 +277,8 @@ def stay_after(stay, hit, place, v, w):
 @packed
 def count_hit(a, i, hit):
     """Count a hit of a wall."""
-    a[N_ARC + i] += 1.0 if hit == ON_ARC else 0.0
-    a[N_BASE + i] += 1.0 if hit == ON_BASE else 0.0
-    a[N_LEFT + i] += 1.0 if hit == ON_LEFT else 0.0
-    a[N_RIGHT + i] += 1.0 if hit == ON_RIGHT else 0.0
-    a[N_FLOOR + i] += 1.0 if hit == ON_FLOOR else 0.0
+    for wall in range(N_WALLS):
+        a[N_ARC + wall * STRIDE + i] += 1.0 if hit == wall else 0.0
 
 
 @packed
@@ -330,16 +329,19 @@ def told_slope(hit, m, vx, vy, limits):
 
 
 @part
-def hop_along_arc(s, outset, r0, dr):
-    """Return f of the arc that was left, by its increments since, of which `dr` is the radius's."""
-    return fma(dr, fma(2.0, r0, dr), -s * fma(s, outset.v2, 2.0 * outset.q))
+def along_arc(a, i, s, outset, there, waves, degree, limits):
+    """Return f of the arc that was left, f', the summed sizes of the terms of half of f', and what is known.
 
-
-@part
-def arc_sizes(s, outset, r, limits):
-    """Return the summed sizes of the terms of half the slope of the arc's function."""
-    x, y, vx, vy, _, _, v2 = outset
-    return fma(abs(x), abs(vx), fma(abs(y), abs(vy), fma(s, v2, r * limits.rate)))
+    f is found by its increments since. The last number is the lesser of `known` and `told` of docs/lanes.md:
+    positive where the radius is known at both ends of a hop, which hangs on r' no more than on what enters.
+    """
+    x, y, vx, vy, _, q, v2 = outset
+    r0, dr, known = radius_since(a, i, s, waves, degree)
+    f = fma(dr, fma(2.0, r0, dr), -s * fma(s, v2, 2.0 * q))
+    rate = 2.0 * fma(there.r, there.r1, -fma(s, v2, q))
+    sizes = fma(abs(x), abs(vx), fma(abs(y), abs(vy), fma(s, v2, there.r * limits.rate)))
+    told = fma(-there.r, limits.rate + limits.arc_rate, sizes)
+    return f, rate, sizes, min(known, told)
 
 
 @part
@@ -349,12 +351,6 @@ def left_in_place(error, hit, vx, vy, r):
     That is so after flights that are many radii long.
     """
     return NEVER if hit == ON_ARC and error * (abs(vx) + abs(vy)) > 16.0 * r else error
-
-
-@part
-def told_rate(r, sizes, limits):
-    """Return `told` of docs/lanes.md: positive where a hop hangs on r' no more than on what enters."""
-    return fma(-r, limits.rate + limits.arc_rate, sizes)
 
 
 @part
@@ -426,24 +422,26 @@ def laws_at_hit(there, delta):
 
 @packed
 def land(a, i, table, waves, slope, degree, limits):
-    """Correct a lane's time of flight once, and tell whether the step is then right; if so, take it."""
-    is_stem, is_mushroom, _, is_relative = table
+    """Correct a lane's time of flight once, and tell whether the step is then right; if so, take it.
+
+    `table` tells whether it is a stem, whether captures are wanted, and whether the width is given as nu.
+    """
+    is_stem, has_captures, is_relative = table
     bend = limits.bend
     outset, hit, s = outset_of(a, i), a[HIT + i], a[S + i]
-    x, y, vx, vy, wall, q, v2 = outset
+    x, y, vx, vy, wall, _, v2 = outset
     there = laws_in(a, AHEAD + i, waves, is_relative, slope, degree)
-    r0, dr, known = radius_since(a, i, s, waves, degree)
-    r, r1 = there.r, there.r1
+    r = there.r
+    hop, arc_rate, sizes, known = along_arc(a, i, s, outset, there, waves, degree, limits)
     k_side = side_curvature(vy, slope, limits)
     end = place_after(s, x, y, vx, vy)
     x_s, x_low, y_s, y_low = end
     f, rate = at_side_or_floor(hit, outset, end, there, slope)
     # The arc: its increments if it was left, else what is there.
-    hop = hop_along_arc(s, outset, r0, dr)
     f_arc = fma(-2.0, fma(x_s, x_low, y_s * y_low), fma(-x_s, x_s, (r - y_s) * (r + y_s)))
     f_arc = hop if wall == ON_ARC else f_arc
     f = f_arc if hit == ON_ARC else f
-    rate = 2.0 * fma(r, r1, -fma(s, v2, q)) if hit == ON_ARC else rate
+    rate = arc_rate if hit == ON_ARC else rate
     half_bend = bend + v2 if hit == ON_ARC else 0.5 * k_side
     f = y_s + y_low if hit == ON_BASE else f
     rate = vy if hit == ON_BASE else rate
@@ -452,7 +450,6 @@ def land(a, i, table, waves, slope, degree, limits):
     delta = -f * inverse
     error = error_left(half_bend * inverse, s, delta, waves)
     error = left_in_place(error, hit, vx, vy, r)
-    sizes = arc_sizes(s, outset, r, limits)
     blur = SAFETY * fma(abs(vx) + abs(vy), s, limits.size + abs(x) + abs(y))
     slack = slack_of(s, blur * (16.0 * r) if hit == ON_ARC else blur, delta, inverse, error)
     # The others are not reached: see the error analysis. The mouth was looked at.
@@ -466,26 +463,24 @@ def land(a, i, table, waves, slope, degree, limits):
     quality = min(quality, min(v2 - bend, pushed))
     if slope is None:
         quality = min(quality, told_slope(hit, there.m, vx, vy, limits))
-    # A hop needs the radius at both of its ends, and its rate as well as what enters.
-    known = min(known, told_rate(r, sizes, limits))
     known = known if hit == ON_ARC else 1.0
     quality = min(quality, known if wall == ON_ARC else 1.0)
     within, ahead = room_ahead(a, i, s, delta, waves)
     result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
     flight = Judged(s, delta, within, result)
-    is_moved, at_hit = settle(a, i, flight, outset, end, there, is_mushroom, slope)
+    is_moved, at_hit = settle(a, i, flight, outset, end, there, has_captures, slope)
     if is_moved:
         move_laws(a, i, delta, at_hit, waves, slope)
 
 
 @packed
-def settle(a, i, flight, outset, end, there, is_mushroom, slope):
+def settle(a, i, flight, outset, end, there, has_captures, slope):
     """Bounce off the wall that was met; returns whether the particle moves on, and the laws at the hit."""
     hit, vx, vy, v2 = a[HIT + i], outset.vx, outset.vy, outset.v2
     t, t_low, at, at_hit, is_moved = arrive(a, i, flight, outset, end, there)
     at = Place(at.x, at.x_low, 0.0 if hit == ON_BASE else at.y, at.y_low)
     vx_s, vy_s = off_the_wall(hit, at, vx, vy, at_hit, slope)
-    stay = stay_after(a[STAY + i], hit, at, (vx, vy, v2), at_hit.w) if is_mushroom else a[STAY + i]
+    stay = stay_after(a[STAY + i], hit, at, (vx, vy, v2), at_hit.w) if has_captures else a[STAY + i]
     is_quiet = stay == a[STAY + i]
     if is_moved:
         count_hit(a, i, hit)
@@ -531,10 +526,11 @@ def error_left(curvature, s, delta, waves):
 
 
 @packed
-def fly(a, n, table, waves, slope, degree, limits):
+def fly(a, n, scene, waves, slope, degree, limits):
     """Find the next collision of each lane, and take the step where it is shown right."""
     widest_registers()
-    is_stem, _, _, is_relative = table
+    is_stem, is_relative = scene.table == STEM, scene.is_relative
+    table = is_stem, scene.table == MUSHROOM, is_relative
     for i in range(n):
         aim(a, i, is_stem, is_relative, waves, slope, degree, limits)
     for i in range(n):
@@ -544,14 +540,14 @@ def fly(a, n, table, waves, slope, degree, limits):
 
 
 @packed
-def chord(a, n, table, waves, slope, degree, limits):
+def chord(a, n, scene, waves, slope, degree, limits):
     """Find the next arc hit of captured particles: the base is unfolded, |L| is constant.
 
     The chord keeps the distance |L| / v from the centre; while that exceeds w the mouth is out of reach.
     """
     widest_registers()
     bend, k_w, size = limits.bend, limits.curvature, limits.size
-    _, _, is_cap, is_relative = table
+    is_cap, is_relative = scene.table == CAP, scene.is_relative
     for i in range(n):
         outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, degree)
         inverse = ONE / (outset.v2 - fma(now.r1, now.r1, now.r * now.r2))
@@ -563,28 +559,23 @@ def chord(a, n, table, waves, slope, degree, limits):
         look_ahead(a, i, a[S + i], waves, is_relative, slope, degree)
     for i in range(n):
         outset, spin = outset_of(a, i), a[SPIN + i]
-        x, y, vx, vy, _, q, v2 = outset
+        x, y, vx, vy, _, _, v2 = outset
         s = a[S + i]
         there = laws_in(a, AHEAD + i, waves, is_relative, slope, degree)
-        r, r1, w = there.r, there.r1, there.w
-        r0, dr, known = radius_since(a, i, s, waves, degree)
-        f = hop_along_arc(s, outset, r0, dr)
-        rate = 2.0 * fma(r, r1, -fma(s, v2, q))
+        f, rate, sizes, known = along_arc(a, i, s, outset, there, waves, degree, limits)
         inverse = ONE / rate
         delta = -f * inverse
         error = error_left((bend + v2) * inverse, s, delta, waves)
         end = place_after(s, x, y, vx, vy)
         # The widest that the mouth can be during the flight, from both ends.
-        reach = max(a[SURE + i], w) + fma(k_w * s, s, SAFETY * size)
+        reach = max(a[SURE + i], there.w) + fma(k_w * s, s, SAFETY * size)
         clear = spin * spin - (1.0 + 4.0 * SAFETY) * reach * reach * v2
         clear = 1.0 if is_cap else clear
-        sizes = arc_sizes(s, outset, r, limits)
         first = -rate - 2.0 * SAFETY * sizes
         slack = slack_of(s, 2.0 * SAFETY * s * sizes, delta, inverse, error)
         place = abs(end.y) - fma(abs(vy), fma(SAFETY, s, slack), SAFETY * abs(y))
         quality = min(min(clear, place), min(first, v2 - bend))
         quality = min(min(quality, s), known)
-        quality = min(quality, told_rate(r, sizes, limits))
         within, ahead = room_ahead(a, i, s, delta, waves)
         result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
         flight = Judged(s, delta, within, result)

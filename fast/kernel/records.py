@@ -158,15 +158,6 @@ class Pieces(NamedTuple):
     until: float
 
 
-class TableOfLanes(NamedTuple):
-    """What kind of table lanes are in, and whether the width is given as nu."""
-
-    is_stem: bool
-    is_mushroom: bool
-    is_cap: bool
-    is_relative: bool
-
-
 class LaneWaves(NamedTuple):
     """A scene's laws as waves over one fundamental phase (omega + omega_low) t.
 
@@ -380,12 +371,6 @@ def copy_rows(a, i, b, j, first, last):
     """Copy what lane i of one pool holds to lane j of another, from one row up to another."""
     for row in range(first, last, STRIDE):
         b[row + j] = a[row + i]
-
-
-@part
-def change_lane(a, i, b, j, degree):
-    """Copy lane i of one pool to lane j of another; without the coefficients where laws are waves."""
-    copy_rows(a, i, b, j, T, POOL_SIZE if degree % 2 == 0 else LAWS)
 
 
 @part

@@ -31,9 +31,8 @@ from fast.kernel.lane_laws import DEGREES, NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, BEND, CAP, DEPTH, FASTEST, HIGHEST, LANES, LOWEST, MUSHROOM, POOL_SIZE, RADIUS, SLOPE,
-    STEM, WIDTH, Compiled, FloatArray, Followed, IntArray, LaneWaves, LawsInLanes, Particle, Pieces, Stops,
-    TableOfLanes,
+    ANCHORS_SHAPE, BEND, DEPTH, FASTEST, HIGHEST, LANES, LOWEST, POOL_SIZE, RADIUS, SLOPE, WIDTH, Compiled,
+    FloatArray, Followed, IntArray, LaneWaves, LawsInLanes, Particle, Pieces, Stops,
 )  # fmt: skip
 
 from fast.kernel.scalar_step import scalar_step
@@ -85,9 +84,10 @@ def limits_of(scene: Compiled) -> LawLimits:
 
 # What the loops and the scalar step take and return, by samples.
 _PARTICLE, _TABLE = Particle(*(0.0,) * 6, 0), np.zeros((1, 1))
-_LOOP_TAKES = (np.zeros(1), 0, TableOfLanes(*(False,) * 4), NO_WAVES, 0.0, LawLimits(*(0.0,) * 8))
+_SCENE = Compiled(0, False, _TABLE, _TABLE)
+_LOOP_TAKES = (np.zeros(1), 0, _SCENE, NO_WAVES, 0.0, LawLimits(*(0.0,) * 8))
 STEP = returns(types.none, *map(typeof, _LOOP_TAKES))
-_STEP_TAKES = (_PARTICLE, 0.0, 0, Compiled(0, False, _TABLE, _TABLE), _TABLE)
+_STEP_TAKES = (_PARTICLE, 0.0, 0, _SCENE, _TABLE)
 CAREFUL = returns(typeof((0, 0.0, _PARTICLE)), *map(typeof, _STEP_TAKES))
 
 run_step, run_careful = caller(STEP), caller(CAREFUL)
@@ -111,10 +111,10 @@ def _loop(step, is_slope_moving, form):
     terms, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
 
     @kept(step.__name__, is_slope_moving, form, **HOW)
-    def loop(a, n, table, waves, slope, limits):
+    def loop(a, n, scene, waves, slope, limits):
         """Take a step of each lane: see fast.kernel.lanes."""
         widest_registers()
-        step(a, n, table, waves if is_waves else None, None if is_slope_moving else slope, terms, limits)
+        step(a, n, scene, waves if is_waves else None, None if is_slope_moving else slope, terms, limits)
 
     return loop
 
@@ -163,7 +163,6 @@ class Worker(NamedTuple):
 
     Attributes:
         scene, limits: the scene, and what holds of it for all time.
-        table: of which kind it is, for the lanes.
         pieces, waves, degree: its laws as the lanes know them.
         slope: of the sides, where it stands still.
         loops: the compiled loops for laws of this degree and such a slope.
@@ -179,7 +178,6 @@ class Worker(NamedTuple):
 
     scene: Compiled
     limits: LawLimits
-    table: TableOfLanes
     pieces: Pieces
     waves: LaneWaves
     degree: int
@@ -217,11 +215,9 @@ def new_worker(
 ) -> Worker:
     """Return a worker that holds no particle yet; with its scene's loops, or the given ones."""
     scene = in_lanes.compiled
-    is_stem, is_mushroom, is_cap = (scene.table == int(kind) for kind in (STEM, MUSHROOM, CAP))
     return Worker(
         scene,
         limits_of(scene),
-        TableOfLanes(is_stem, is_mushroom, is_cap, bool(scene.is_relative)),
         in_lanes.pieces,
         in_lanes.waves,
         in_lanes.degree,

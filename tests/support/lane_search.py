@@ -72,7 +72,7 @@ class Round(LaneRound):
         of, limits, k = self.in_lanes, self.worker.limits, self.kernels
         waves = of.waves if of.degree in (k.ONE_WAVE, k.TWO_WAVES) else None
         step = k.chord if self.is_disk else k.fly
-        step(a, count, self.worker.table, waves, of.slope, (0,) * of.degree, limits)
+        step(a, count, self.worker.scene, waves, of.slope, (0,) * of.degree, limits)
 
     def correct_lane(self, a: list[float], i: int) -> None:
         """Correct a step that is not yet right again, as the next rounds do."""

@@ -62,7 +62,7 @@ LONGEST = [
     "test_theory_distribution.py",
     "test_conformance_bench.py",
     "test_theory_large_deviations.py",
-    "test_fast_stays.py",
+    "test_fast_ensemble.py",
 ]
 
 

@@ -7,14 +7,14 @@ from support.depth import deep_but
 from support.faulty_kernels import value_of
 
 ELSEWHERE = (
-    "test_fast_given_starts",
+    "test_fast_recollisions",
     "any(off > 1e-10 or hits for wall, n in (('arc', 16), ('base', 60))"
     " for off, hits in differences('a cap', wall, n))",
 )
 # The module and the expression that finds a fault; the file, what stands there, and what the fault has.
 FAULTS = {
     "a start that has left its arc is still taken as given": (
-        "test_fast_given_starts",
+        "test_fast_recollisions",
         "share_of_careful_steps('a mushroom', 8, 30.0) > 0.4",
         *("follow.py", "a[AS_GIVEN + i] = 0.0", "a[AS_GIVEN + i] = 1.0"),
     ),

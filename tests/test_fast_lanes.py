@@ -1,33 +1,43 @@
-"""The lanes against the careful step, at collisions of trajectories, and what the compiler made of them.
+"""The lanes against the scalar step, at collisions of trajectories; their laws; their machine code.
 
 `MUSHROOMS_LANE_STEPS=1000000 pytest tests/test_fast_lanes.py` checks a million steps, in a minute.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from types import FunctionType
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import MPContext
 from msgspec.structs import replace
 from numba import njit, types
 from support.depth import deep_but
+from support.from_python import from_python
 
 import fast
+from conformance.cases.delicate_families import sunk
+from conformance.strategies import scenes
+from fast import pieces
 from fast.batch import take_careful_steps
 from fast.ensemble import initial_states
 from fast.kernel import worker
 from fast.kernel.compiling import HOW, TOOLS
-from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
+from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES, fresh_phase, law_at, law_of_waves, piece_at
 from fast.kernel.lanes import chord, fly
-from fast.kernel.records import LANES, MUSHROOM, POOL_SIZE, Compiled
+from fast.kernel.records import DEPTH, LANES, MUSHROOM, N_HARMONICS, OMEGA, POOL_SIZE, SHARED, Compiled
 from fast.kernel.worker import CACHE_LINE, LawLimits, new_pools
-from fast.pieces import PARABOLA, SERIES
+from fast.pieces import PARABOLA, SERIES, laws_in_lanes, waves_of
 from fast.step import WALL_CODES
-from fast.units import compile_scene
+from fast.units import compile_scene, fit
 from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, load
+from scene.laws import bounds, value
+from scene.tables import width_factors
 
 N_STEPS = int(os.environ.get("MUSHROOMS_LANE_STEPS", "20000"))
 PATH = 2000  # collisions
@@ -204,3 +214,160 @@ def test_pools_begin_with_a_cache_line_wherever_memory_lies():
         assert pools.ctypes.data % CACHE_LINE == 0
         assert pools.flags.c_contiguous
         assert pools.shape == (2, POOL_SIZE)
+
+
+ROUNDING = 8 * 2.0**-53
+CTX = MPContext()
+CTX.dps = 40
+
+
+def as_rows(scene):
+    """Return a scene's laws by the row of their coefficients."""
+    found = {} if isinstance(scene, Stem) else {0: scene.r}
+    if not isinstance(scene, Cap):
+        found |= {1: width_factors(scene)[0], 2: scene.h, 3: scene.slope}
+    return found
+
+
+def worst_errors(scene, random, n):
+    """Return how far polynomials are from laws: value over its size, rate and mean rate over their terms."""
+    compiled, worst = compile_scene(scene), np.zeros(3)
+    degree = (0,) * (SERIES if compiled.laws[SHARED, OMEGA] > 0.0 else PARABOLA)
+    p = pieces.pieces_of(compiled, len(degree))
+    span = 7 * p.period if p.period < np.inf else 10.0
+    for t in random.uniform(-span, span, n):
+        piece, reference, low = from_python(piece_at)(p, t, 0.0)
+        near, far = np.sort(random.choice([-1.0, 1.0, *random.uniform(-1, 1, 2)], 2)) * p.limits[piece]
+        if p.period == np.inf:
+            near, far = -1.0, 1.0
+        for row, law in as_rows(scene).items():
+            f, rate, _, mean = from_python(law_at)(p.coefficients[piece, row], 0, 1, far, near, degree)
+            at = [CTX.mpf(reference) + CTX.mpf(low) + CTX.mpf(u) for u in (near, far)]
+            true = [value(CTX, law, u) for u in at]
+            rates = terms_of_rate(law)
+            size = max(abs(v) for v in true) + (row == 3)
+            errors = [abs(f - true[1]) / size, abs(rate - value(CTX, law, at[1], 1)) / rates, 0.0]
+            if near != far:
+                errors[2] = abs(mean - (true[1] - true[0]) / (at[1] - at[0])) / rates
+            worst = np.maximum(worst, [float(e) for e in errors])
+    return worst
+
+
+def terms_of_rate(law):
+    """Return the summed sizes of the terms of a law's rate, 1 for a constant."""
+    if isinstance(law, Fourier):
+        omega = law.omega or 2 * np.pi / law.period
+        sizes = [k * (abs(c) + abs(s)) for k, c, s in law.harmonics()]
+        return omega * sum(sizes) or 1.0
+    return bounds(law).slope or 1.0
+
+
+@given(scenes(), st.integers(0, 2**32 - 1))
+@settings(max_examples=30)
+def test_polynomials_are_the_laws_within_rounding(scene, seed):
+    scene = fit(scene).scene
+    assert (worst_errors(scene, np.random.default_rng(seed), 4) <= ROUNDING).all()
+
+
+DEEP = [
+    Mushroom(r=Fourier(1.0, 1.0, (0.9985,)), nu=0.5, h=1.0),
+    Mushroom(r=1.0, w=0.1, h=1.0, slope=Fourier(0.0, 3.0, tuple(0.05 / k**2 for k in range(1, 17)))),
+    Cap(r=Fourier(mean=1.0, period=1.0, cos=(0.1, 0.0, 0.02), sin=(0.0, 0.05))),
+    Stem(
+        w=BangBang(((0.3125, 1.0), (0.55, 0.2), (1.3125, 1.0))),
+        h=Fourier(mean=2.0, period=1.0, sin=tuple(1.0 / k**3 for k in range(1, 17))),
+    ),
+    Stem(w=BangBang(((-0.6875, 1.0), (-0.6874, 0.9), (0.3125, 1.0))), h=1.0),
+]
+
+
+# Waves that cancel to a millionth.
+VANISHING = [Stem(w=1.0, h=sunk(4, 1e-6, least)) for least in (0.0, 0.3)]
+
+
+@pytest.mark.parametrize("scene", [*DEEP, *VANISHING])
+def test_deep_quick_and_mixed_laws_too(scene):
+    assert (worst_errors(scene, np.random.default_rng(1), 40) <= ROUNDING).all()
+
+
+@pytest.mark.usefixtures("uncached")
+@pytest.mark.parametrize("scene", DEEP[:4])
+def test_pieces_that_hold_for_too_long_are_seen(scene, monkeypatch):
+    reach = pieces.reach
+    monkeypatch.setattr(pieces, "reach", lambda compiled, degree: 2.0 * reach(compiled, degree))
+    assert not (worst_errors(scene, np.random.default_rng(1), 40) <= ROUNDING).all()
+
+
+@pytest.mark.parametrize("scene", VANISHING)
+def test_pieces_of_waves_that_are_rounded_where_they_cancel_are_seen(scene, monkeypatch):
+    """Rounded as waves would be that add up to the mean."""
+    pieces_of = pieces.pieces_of
+
+    def rough(*given):
+        found = pieces_of(*given)
+        found.coefficients[:, DEPTH, 0] += 2.0**-54
+        return found
+
+    monkeypatch.setattr(pieces, "pieces_of", rough)
+    assert worst_errors(scene, np.random.default_rng(1), 40)[0] > 100 * 2.0**-53
+
+
+def test_degrees_are_no_higher_than_it_takes():
+    assert [laws_in_lanes(scene).degree for scene in DEEP] == [SERIES] * 4 + [PARABOLA]
+    assert len(laws_in_lanes(Cap(r=Fourier(1.0, 1.0, (0.8,)))).pieces.begins) >= 27
+
+
+def test_lanes_know_no_phase_that_the_careful_step_calls_lost():
+    """It is lost from 2^27 quarter turns of the highest harmonic on."""
+    for scene in DEEP[:4]:
+        compiled = compile_scene(scene)
+        n, omega = compiled.laws[SHARED, N_HARMONICS], compiled.laws[SHARED, OMEGA]
+        assert 2.0**20 < omega * laws_in_lanes(scene).pieces.until < math.pi / 2 * 2.0**27 / n
+
+
+@pytest.mark.usefixtures("uncached")
+def test_laws_that_take_too_many_pieces_are_left_to_careful_steps(monkeypatch):
+    monkeypatch.setattr(pieces, "MAX_PIECES", 8)
+    assert pieces.pieces_of(compile_scene(DEEP[0]), SERIES) is None
+    assert laws_in_lanes(DEEP[0]).pieces.until < 0.0
+
+
+WAVING = Mushroom(
+    r=Fourier(1.0, 1.1, (0.2, 0.1), (0.3,)),
+    h=Fourier(2.0, 1.1, (), (0.0, 0.5)),
+    nu=Fourier(0.5, 1.1, (0.1,), (0.0, 0.1)),
+    slope=Fourier(0.0, 1.1, (0.05,)),
+)
+
+
+def worst_of_waves(random, spoilt=0.0):
+    """Return how far waves are from laws, in units of 2^-53 of the waves and of what a rounding of t does."""
+    waves, worst = waves_of(compile_scene(WAVING)), 0.0
+    laws = (WAVING.r, waves.r), (WAVING.h, waves.h), (WAVING.nu, waves.w), (WAVING.slope, waves.m)
+    for t in [*random.uniform(-20.0, 20.0, 40).tolist(), *(10.0 ** random.uniform(2, 7, 40)).tolist()]:
+        low = float(t * 2.0**-53 * random.uniform(-0.5, 0.5))
+        sine, cosine = from_python(fresh_phase)(t, low * (1.0 - spoilt), waves)
+        at = CTX.mpf(t) + CTX.mpf(low)
+        for law, wave in laws:
+            found = from_python(law_of_waves)(wave, sine, cosine, waves.omega, (0,) * TWO_WAVES)
+            sizes = [sum(map(abs, wave)), terms_of_rate(law)]
+            for order, size in enumerate(sizes):
+                true = value(CTX, law, at, order)
+                moved = 0.5 * abs(t) * abs(value(CTX, law, at, order + 1))
+                worst = max(worst, float(abs(found[order] - true) / (size + moved)) * 2.0**53)
+    return worst
+
+
+def test_waves_are_the_laws_within_rounding():
+    assert worst_of_waves(np.random.default_rng(1)) < 4.0
+
+
+def test_waves_whose_time_is_rounded_are_seen():
+    assert worst_of_waves(np.random.default_rng(1), spoilt=64.0) > 4.0
+
+
+def test_sizes_that_come_down_far_are_no_waves():
+    """Nor are more than two harmonics, or knots."""
+    assert [laws_in_lanes(Cap(r=Fourier(1.0, 1.0, (a,)))).degree for a in (0.74, 0.76)] == [ONE_WAVE, SERIES]
+    assert laws_in_lanes(Cap(r=Fourier(1.0, 1.0, (0.1, 0.1)))).degree == TWO_WAVES
+    assert laws_in_lanes(Cap(r=Fourier(1.0, 1.0, (0.1, 0.1, 0.1)))).degree == SERIES

@@ -176,7 +176,7 @@ class LaneRound:
         self.compiled = compile_scene(scene)
         self.is_disk = bool(self.compiled.table == records.CAP)
         self.in_lanes = laws_in_lanes(scene)
-        self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6)), 1, (1, 1)))
+        self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6))))
         self.serves = float(np.diff(self.in_lanes.pieces.begins, append=self.in_lanes.pieces.period).max())
         self.anchors = np.zeros(ANCHORS_SHAPE)
         self.pool, self.spare = np.zeros(records.POOL_SIZE), np.zeros(records.POOL_SIZE)

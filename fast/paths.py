@@ -87,7 +87,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     in_lanes, exponents = laws_in_lanes(fit(scene).scene), units.of_step()
     rows, (wall,) = as_arrays([start])
     stop = only_stop(units.horizon(t_end))
-    worker = new_worker(in_lanes, stop, unfilled_ends(rows, 1, (1, 1)), loops=Loops(careful_at(), 0, 0))
+    worker = new_worker(in_lanes, stop, unfilled_ends(rows), loops=Loops(careful_at(), 0, 0))
     # Steps are brought back in passing: a pass of its own took a quarter of the time.
     halves = np.stack([exponents // 2, exponents - exponents // 2])
     factors = np.ldexp(1.0, np.vstack([halves, -halves]))
@@ -362,11 +362,11 @@ def carry(
         BadInput: the scene does not fit into binary64: see fast.units.
     """
     starts = {i: fitted_start(scene, states[i]) for i, refusal in enumerate(refusals) if refusal is None}
-    every, outcomes, seconds = unfilled_ends(np.empty((len(states), 6)), 1, (1, 1)), list(refusals), 0.0
+    every, outcomes, seconds = unfilled_ends(np.empty((len(states), 6))), list(refusals), 0.0
     for units in sorted({units for _, units in starts.values()}):
         those = [i for i, start in starts.items() if start[1] == units]
         rows, walls = as_arrays([starts[i][0] for i in those])
-        done = unfilled_ends(rows, 1, (1, 1))
+        done = unfilled_ends(rows)
         stop = only_stop(units.horizon(t_end))
         seconds += follow_many(laws_in_lanes(fit(scene).scene), done, walls, stop, threads)
         # t, its low part, x, y, vx, vy; begin and end of the capture interval

@@ -33,10 +33,7 @@ MAX_STATEMENTS = {
 }
 MAX_ARGUMENTS = 8  # of a kernel: what belongs together is a record
 # Python hands these a state number by number; a record would take longer than the step.
-CROWDED = {
-    "fast/kernel/single.py: single",
-    "fast/kernel/single.py: question",
-}
+CROWDED = {"fast/kernel/single.py: single"}
 # Complete in themselves, as examples for other people's steppers: their classes may have our names.
 COMPLETE = ("conformance/harness/", "conformance/verify.py")
 # Joined here so that this file does not contain what it forbids.

@@ -276,9 +276,12 @@ class Followed(NamedTuple):
 
 
 def unfilled_ends(
-    states: FloatArray, n_columns: int, slots: tuple[int, int], n_lane_rows: int = 0
+    states: FloatArray, n_columns: int = 1, slots: tuple[int, int] = (1, 1), n_lane_rows: int = 0
 ) -> Followed:
-    """Return what is to be filled in for particles that start from `states`, which are overwritten."""
+    """Return what is to be filled in for particles that start from `states`, which are overwritten.
+
+    By default for one stop, with one capture interval.
+    """
     n = len(states)
     return Followed(
         states,

@@ -73,39 +73,29 @@ def scaled(number, exponent):
 
 
 @kernel
-def question(length, time, t, x, y, vx, vy, wall, t_end):
-    """Return whether a state and a horizon can be taken, and both in the kernel's units; see fast.units."""
+def rescaled(particle, length, time):
+    """Return a particle times 2^length and 2^time, and whether all its numbers are finite and exact then."""
     speed = length - time
-    t_in, is_t_kept = scaled(t, -time)
-    x_in, is_x_kept = scaled(x, -length)
-    y_in, is_y_kept = scaled(y, -length)
-    vx_in, is_vx_kept = scaled(vx, -speed)
-    vy_in, is_vy_kept = scaled(vy, -speed)
-    end, is_end_kept = scaled(t_end, -time)
-    if abs(end) == np.inf and abs(t_end) < np.inf:
-        end, is_end_kept = math.copysign(LARGEST_FLOAT, t_end), True
-    fastest = max(abs(vx_in), abs(vy_in))
-    is_good = t_end >= t and (fastest == 0.0 or fastest >= 1.0 / LARGEST)
-    is_good = is_good and max(abs(x_in), abs(y_in), fastest) <= LARGEST
-    is_good = is_good and is_t_kept and is_x_kept and is_y_kept and is_vx_kept and is_vy_kept and is_end_kept
-    return is_good, Particle(t_in, 0.0, x_in, y_in, vx_in, vy_in, wall), end
+    t, is_t_kept = scaled(particle.t, time)
+    x, is_x_kept = scaled(particle.x, length)
+    y, is_y_kept = scaled(particle.y, length)
+    vx, is_vx_kept = scaled(particle.vx, speed)
+    vy, is_vy_kept = scaled(particle.vy, speed)
+    is_kept = is_t_kept and is_x_kept and is_y_kept and is_vx_kept and is_vy_kept
+    return Particle(t, 0.0, x, y, vx, vy, particle.wall), is_kept
 
 
 @kernel
-def answer(length, time, code, dt, particle):
-    """Return a collision, or the place at the horizon, in a scene's units: (code, dt, t, x, y, vx, vy)."""
-    t, speed = particle.t, length - time
-    if code == HORIZON:
-        dt, t = 0.0, 0.0  # neither is asked for
-    dt_out, is_dt_kept = scaled(dt, time)
-    t_out, is_t_kept = scaled(t, time)
-    x_out, is_x_kept = scaled(particle.x, length)
-    y_out, is_y_kept = scaled(particle.y, length)
-    vx_out, is_vx_kept = scaled(particle.vx, speed)
-    vy_out, is_vy_kept = scaled(particle.vy, speed)
-    if not (is_dt_kept and is_t_kept and is_x_kept and is_y_kept and is_vx_kept and is_vy_kept):
-        code = ANSWER_LOST
-    return code, dt_out, t_out, x_out, y_out, vx_out, vy_out
+def question(given, t_end, length, time):
+    """Return whether a state and a horizon can be taken, and both in the kernel's units; see fast.units."""
+    particle, is_kept = rescaled(given, -length, -time)
+    end, is_end_kept = scaled(t_end, -time)
+    if abs(end) == np.inf and abs(t_end) < np.inf:
+        end, is_end_kept = math.copysign(LARGEST_FLOAT, t_end), True
+    fastest = max(abs(particle.vx), abs(particle.vy))
+    is_good = t_end >= given.t and (fastest == 0.0 or fastest >= 1.0 / LARGEST)
+    is_good = is_good and max(abs(particle.x), abs(particle.y), fastest) <= LARGEST
+    return is_good and is_kept and is_end_kept, particle, end
 
 
 @kept(error_model="numpy")
@@ -118,14 +108,20 @@ def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
     """
     length = int(numbers[2])
     time = static_time(length, max(abs(vx), abs(vy))) if np.isnan(numbers[3]) else int(numbers[3])
-    is_good, particle, end = question(length, time, t, x, y, vx, vy, wall, t_end)
+    is_good, particle, end = question(Particle(t, 0.0, x, y, vx, vy, wall), t_end, length, time)
     if not is_good:
         return REFUSED, 0.0, t, x, y, vx, vy
     known = particle, end - particle.t, GIVEN, unpack_scene(numbers), np.zeros(ANCHORS_SHAPE)
-    code, dt, particle = run_careful(step_at, known)
+    code, dt, p = run_careful(step_at, known)
     if code > HORIZON:
         return (REFUSED if code == OFF_WALL else code), 0.0, t, x, y, vx, vy
-    return answer(length, time, code, dt, particle)
+    if code == HORIZON:  # neither time is asked for
+        dt, p = 0.0, Particle(0.0, 0.0, p.x, p.y, p.vx, p.vy, p.wall)
+    after, is_kept = rescaled(p, length, time)
+    dt, is_dt_kept = scaled(dt, time)
+    if not (is_kept and is_dt_kept):
+        code = ANSWER_LOST
+    return code, dt, after.t, after.x, after.y, after.vx, after.vy
 
 
 @kept(error_model="numpy")

@@ -77,7 +77,7 @@ def residual(particle, scene, anchors):
 
 @kept(error_model="numpy")
 def fill_careful(step_at, scene, states, walls, n_times, found):
-    """Fill in codes, times and ends of a careful step from each start, n_times over."""
+    """Fill in codes, times and ends of a scalar step from each start, n_times over."""
     codes, times, ends = found
     anchors = np.zeros(ANCHORS_SHAPE)
     for k in range(n_times * states.shape[0]):
@@ -90,7 +90,7 @@ def fill_careful(step_at, scene, states, walls, n_times, found):
 def take_careful_steps(
     compiled: Compiled, states: FloatArray, walls: IntArray, n_times: int = 1
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Take a careful step from each of N states, all in the kernel's units; see `careful_steps`.
+    """Take a scalar step from each of N states, all in the kernel's units; see `careful_steps`.
 
     Args:
         compiled: the scene's numbers.

@@ -331,7 +331,7 @@ class Plan(NamedTuple):
         Args:
             states: (N, 6) where they start; overwritten by their ends.
             n_lane_rows: of what is kept of a lane; 0 to keep none.
-            lanes: (N, n_lane_rows) what has been kept of them, for those who go on.
+            lanes: (N, n_lane_rows) what has been kept of them, if they go on.
             n_passed: stops that these have passed.
 
         Returns:

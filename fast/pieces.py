@@ -38,7 +38,7 @@ SHALLOW = 0.25  # of its mean: see `waves_of`
 MAX_PIECES = 2**15
 REMAINDER = 2.0**-54
 ALWAYS = np.array([math.inf])
-# No piece serves: known neither when laws repeat nor up to when, so that steps are careful ones.
+# No piece serves: known neither when laws repeat nor up to when, so that steps are scalar ones.
 NO_PIECES = Pieces(
     0.0, math.inf, 0.0, np.zeros(1), np.zeros((1, 2)), ALWAYS, ALWAYS, np.zeros((1, 4, 1)), -1.0
 )

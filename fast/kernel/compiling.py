@@ -30,7 +30,7 @@ from numba.extending import intrinsic, register_jitable
 
 SEAL = hashlib.sha256().digest_size  # bytes, at the end of an index file
 # No fastmath, so that results are the same bits on every machine; quotients by zero are infinite or nan, as
-# in numpy. Who enters the kernel holds its arrays while it runs, hence no references are counted in it: each
+# in numpy. The caller of a kernel holds its arrays while it runs, hence no references are counted in it: each
 # count is an atomic operation, and much to compile. So a kernel cannot allocate.
 HOW: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 

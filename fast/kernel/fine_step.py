@@ -1,6 +1,6 @@
-"""The fine step: the careful step's collision to about 31 decimals, in double-double arithmetic.
+"""The fine step: the scalar step's collision to about 31 decimals, in double-double arithmetic.
 
-The careful step, on the state rounded to binary64, says which wall is met first and when, or that it cannot
+The scalar step, on the state rounded to binary64, says which wall is met first and when, or that it cannot
 tell; where the state has low parts, its residuals are judged no better than that rounding. Newton's method in
 pairs then gives the time, from a wall function made of increments since the last event, so that a hop along
 a wall keeps its digits; place, wall speed and reflection follow in pairs. A path carries its state in pairs.
@@ -232,7 +232,7 @@ def reflected(wall, state, scene):
 
 @kernel
 def rounded(state, wall):
-    """Return a fine state as the careful step takes it."""
+    """Return a fine state as the scalar step takes it."""
     return Particle(state.t[0], state.t[1], state.x[0], state.y[0], state.vx[0], state.vy[0], wall)
 
 

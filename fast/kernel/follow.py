@@ -43,7 +43,7 @@ from fast.kernel.records import (  # isort: skip
 from fast.kernel.scalar_step import KNOWN, NEAR
 from fast.kernel.worker import DISK, FORMS, GENERAL, NEXT_STOP, PARTICLE, run_careful, run_step
 
-# Columns of what is kept: the pool, the number of the next stop, careful steps so far, whether the lanes know
+# Columns of what is kept: the pool, the number of the next stop, scalar steps so far, whether the lanes know
 # the laws; then the rows of the pool up to W0_LOW.
 POOL, NEXT, CAREFUL, IS_KNOWN = np.arange(4)
 FIRST_ROW = 4
@@ -188,7 +188,7 @@ def careful_flight(a, i, worker):
 
 @kernel
 def land_carefully(pool, a, i, code, s, p, worker):
-    """Move a lane to the collision that a careful step has found; the anchors hold the laws there."""
+    """Move a lane to the collision that a scalar step has found; the anchors hold the laws there."""
     scene, hit = worker.scene, float(code)
     if code != ARC or a[WALL + i] != ON_ARC:  # it has left the arc by now
         a[AS_GIVEN + i] = 0.0
@@ -266,7 +266,7 @@ def mark(pool, a, i, since, roster, worker):
 
 @kernel
 def code_of_attention(pool, a, i, roster, worker):
-    """Take a lane past stops, or a careful step; returns the code of its end, or ARC for none."""
+    """Take a lane past stops, or a scalar step; returns the code of its end, or ARC for none."""
     stops, followed, end = worker.stops, worker.followed, worker.stops.times[-1]
     is_late = knows_laws(a, i, worker) and a[FATE + i] == LATE
     if followed.lanes.shape[1] > 0 and not (is_late and a[WHEN + i] < end):
@@ -285,7 +285,7 @@ def code_of_attention(pool, a, i, roster, worker):
         code = ARC if code < HORIZON else code
     if roster[NEXT_STOP, i] < worker.n_passed:
         # Put back, it does not pass all stops again: the last had come within rounding of a collision, or the
-        # careful step, which now looks further, is undecided. A run at once would have written otherwise.
+        # scalar step, which now looks further, is undecided. A run at once would have written otherwise.
         return np.int64(ANEW)
     if code == ARC and collisions_of(a, i) > stops.most:
         if pool == DISK:
@@ -298,7 +298,7 @@ def code_of_attention(pool, a, i, roster, worker):
 def attend(pool, a, i, roster, worker):
     """Do for a lane what `advance` could not; returns whether it stays, moves to the other pool or ends.
 
-    Who has had too many collisions is given up: energy may grow without end.
+    A particle with too many collisions is given up: energy may grow without end.
     """
     fate, knows = a[FATE + i], knows_laws(a, i, worker)
     if knows and fate == MARKED:
@@ -470,7 +470,7 @@ def fly_alone(a, is_stem, is_relative, waves, slope, degree, limits):
 def next_hit(a, worker, waves, slope, degree):
     """Take the next step of the particle in the first lane; returns its wall, or what comes instead.
 
-    The lanes' answer is taken unless the end may come before: there the careful step looks from both sides.
+    The lanes' answer is taken unless the end may come before: there the scalar step looks from both sides.
     """
     limit = (worker.stops.times[-1] - a[T]) - a[T_LOW]
     a[STOP] = min(a[T] + limit * (1.0 - 4.0 * NEAR), worker.pieces.until)

@@ -10,7 +10,7 @@ its speed is that time's multiple, so that time must be right relative to itself
 knots are written in. All Fourier laws of a scene share their omega, so the sines and cosines of the harmonics
 are found once for all of them, at the event (row PHASE) and for the turn since then, at one s (row TURN).
 
-Whoever uses a size takes its value for right to a unit or two in its last place. Its terms are known to
+A size is used as if its value were right to a unit or two in its last place. Its terms are known to
 2^-62 of themselves, which is enough where they leave more than a small part of the mean; where they cancel
 further, and a mouth all but closes, the phases are found again to twice as many digits (`is_cancelled`).
 """

@@ -231,7 +231,7 @@ class Stops(NamedTuple):
             when it spans that instant.
         is_first_kept: the first capture interval is kept in slot 0, whatever its length.
         most: collisions after which a particle is given up; energy may grow without end.
-        called_off: (1,) whoever no longer wants what is followed sets this to 1, from another thread: the
+        called_off: (1,) set to 1 from another thread where nothing more is wanted of what is followed: the
             kernel looks at it every few flights, and returns with whatever is there.
     """
 
@@ -251,13 +251,13 @@ class Followed(NamedTuple):
         states: (N, 6) last t, its low part, x, y, vx, vy.
         codes: (N,) why each particle ended, HORIZON when all went well.
         counts: (N, 5) collisions by wall: arc, base, left, right, floor.
-        careful: (N,) collisions found by the careful step.
+        careful: (N,) collisions found by the scalar step.
         energies: (N, C) energy at each stop that asks for it.
         is_captured: (N, C) whether the last arc hit before had |sin phi| > nu, and no wall of the
             stem has been met since.
         t_in, t_out: (N, K, M) the capture intervals that are kept; nan for none.
-        lanes: (N, LANE_ROWS) what goes on from the last stop, nan for who ended before it: see
-            fast.kernel.follow; (N, 0) where nobody asks for it.
+        lanes: (N, LANE_ROWS) what goes on from the last stop, nan for a particle that ended before it: see
+            fast.kernel.follow; (N, 0) where it is not asked for.
     """
 
     states: FloatArray

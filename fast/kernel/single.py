@@ -100,7 +100,7 @@ def question(given, t_end, length, time):
 
 @kept(error_model="numpy")
 def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
-    """Take a careful step, whose address is given, in a packed scene.
+    """Take a scalar step, whose address is given, in a packed scene.
 
     Returns:
         (code, dt, t, x, y, vx, vy): a wall's code and the collision there, HORIZON and the place then, or why

@@ -97,7 +97,7 @@ class Loops(NamedTuple):
     """Addresses of the compiled loops that serve a scene; without the compiler, the functions themselves.
 
     Attributes:
-        careful: the careful step.
+        careful: the scalar step.
         fly: a step of each lane.
         chord: the same for captured particles.
     """
@@ -142,7 +142,7 @@ def address(entry: Any, signature: Signature) -> Any:
 
 @cache
 def careful_at() -> Any:
-    """Compile the careful step, or load it, and return its address."""
+    """Compile the scalar step, or load it, and return its address."""
     return address(scalar_step, CAREFUL)
 
 
@@ -241,7 +241,7 @@ Found = TypeVar("Found")
 
 @contextmanager
 def interruptible(n_threads: int, called_off: IntArray) -> Iterator[ThreadPoolExecutor]:
-    """Provide threads for kernels that look at `called_off`: who raises waits until they have, no longer."""
+    """Provide threads for kernels that look at `called_off`. An exception sets it, and waits for a look."""
     with ThreadPoolExecutor(n_threads) as pool:
         try:
             yield pool

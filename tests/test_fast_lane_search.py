@@ -188,7 +188,7 @@ MUTANTS = {
     "the mouth at the end of a chord": (
         "captured beside a moving mouth",
         500,
-        "reach = max(a[SURE + i], w)",
+        "reach = max(a[SURE + i], there.w)",
         "reach = a[SURE + i]",
     ),
     "the mouth's curvature under a chord": (

@@ -489,8 +489,8 @@ class Paused(NamedTuple):
         ensemble: results up to the end of its last cycle.
         lanes: (N, LANE_ROWS) each particle at its last collision, and its next one, in the stepper's own
             units (`fast.kernel.follow`); nan for one that was not followed to the end.
-        asked: table, laws, seed, first and phases of the run, by name; None if a caller has rebuilt the
-            object and guarantees them.
+        asked: table, laws, n_particles, energy, seed, first and phases of the run, by name; None if a caller
+            has rebuilt the object and guarantees them.
     """
 
     ensemble: Ensemble
@@ -525,9 +525,15 @@ def go_on(
             size; or the cycles reach a time at which the lanes no longer resolve the phases of the laws.
     """
     plan = planned(scene, n_particles, energy, n_cycles, seed, first, threads, phases, progress)
-    own: dict[str, Any] = {"n_particles": n_particles, "energy": plan.energy0, "seed": plan.seed}
-    own |= {"first": plan.first, "phases": check_phases(phases)}
-    asked = {"table": type(scene).__name__, **laws(scene), **own}
+    asked: dict[str, Any] = {
+        "table": type(scene).__name__,
+        **laws(scene),
+        "n_particles": plan.size[0],
+        "energy": plan.energy0,
+        "seed": plan.seed,
+        "first": plan.first,
+        "phases": check_phases(phases),
+    }
     if before is None:
         done, seconds = plan.followed(plan.starts(), LANE_ROWS)
         return Paused(plan.ensemble(done, seconds), done.lanes, asked)

@@ -35,8 +35,9 @@ from fast.kernel.lane_laws import (
 
 from fast.kernel.records import (  # isort: skip
     AHEAD, CAP, CAPTURED, CLEARLY, COARSE, END, FAR, FATE, HIT, LATE, MARKED, MAX_CORRECTIONS, MOVED,
-    MUSHROOM, NEVER, NOT_YET, N_ARC, N_BASE, N_WALLS, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, OVER,
-    R0, REFUSED, S, SPIN, STAY, STEM, STOP, STRIDE, SURE, T, TRIES, T_LOW, VX, VY, WALL, WHEN, X, Y, Place,
+    MUSHROOM, NEVER, NOT_YET, N_ARC, N_BASE, N_FLOOR, N_LEFT, N_RIGHT, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT,
+    ON_RIGHT, OVER, R0, REFUSED, S, SPIN, STAY, STEM, STOP, SURE, T, TRIES, T_LOW, VX, VY, WALL, WHEN, X, Y,
+    Place,
 )  # fmt: skip
 
 ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
@@ -277,8 +278,11 @@ def stay_after(stay, hit, place, v, w):
 @packed
 def count_hit(a, i, hit):
     """Count a hit of a wall."""
-    for wall in range(N_WALLS):
-        a[N_ARC + wall * STRIDE + i] += 1.0 if hit == wall else 0.0
+    a[N_ARC + i] += 1.0 if hit == ON_ARC else 0.0
+    a[N_BASE + i] += 1.0 if hit == ON_BASE else 0.0
+    a[N_LEFT + i] += 1.0 if hit == ON_LEFT else 0.0
+    a[N_RIGHT + i] += 1.0 if hit == ON_RIGHT else 0.0
+    a[N_FLOOR + i] += 1.0 if hit == ON_FLOOR else 0.0
 
 
 @packed

@@ -58,7 +58,8 @@ def test_the_compiler_packs_divisions_and_square_roots(loop, form, is_slope_movi
     if not re.search("vdiv[sp]d", assembly):
         pytest.skip("needs a machine with AVX")
     widest = "z" if "+avx512f" in TOOLS[3] else "y"
-    assert re.search(rf"vdivpd\s+.*%{widest}mm", assembly)
+    # The guess of the time, its correction and the bounce divide: none of these loops is left unpacked.
+    assert len(re.findall(rf"vdivpd\s+.*%{widest}mm", assembly)) >= 3
     if loop == "fly":
         assert re.search(rf"vsqrtpd\s+.*%{widest}mm", assembly)
 

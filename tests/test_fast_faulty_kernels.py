@@ -60,12 +60,12 @@ FAULTS = {
     ),
     # Few questions: with rough phases some take minutes.
     "rough phases beside a wall that is nearly shut": (
-        "test_fast_vanishing",
+        "test_fast_stepper",
         "len(attack('nearly-shut', 25, 3).cases['wrong']) > 0",
         *("laws.py", "CANCELLED = 2.0**-4", "CANCELLED = 0.0"),
     ),
     "rough phases beside a wall that is all but gone": (
-        "test_fast_vanishing",
+        "test_fast_stepper",
         "len(attack('all-but-gone', 25, 1).cases['wrong']) > 0",
         *("laws.py", "CANCELLED = 2.0**-4", "CANCELLED = 0.0"),
     ),

@@ -21,7 +21,6 @@ from support.truth import proved_step
 
 import fast
 import reference
-from conformance.cases import certify
 from conformance.cases.attacks import UnderAttack, run, stepped
 from conformance.cases.delicate_families import sunk
 from conformance.cases.draw import Draw
@@ -420,7 +419,7 @@ def test_lanes_meet_what_is_left(n, left, tally):
     for start, answer in zip(starts, lane_steps(scene, starts), strict=True):
         if answer is None:
             continue
-        judged = stepped(answer, certify.proved_step(scene, start, start.t + 100.0), start)
+        judged = stepped(answer, proved_step(scene, start, start.t + 100.0), start)
         tally[judged.kind] += 1
         assert judged.kind == "agreed", judged
     assert tally["agreed"] > 30

@@ -452,13 +452,15 @@ def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
     assert ("1 blocks (0)" in ended.err) == (n_written > 3)
 
 
-def test_a_chunk_holds_the_cycles_that_a_run_began_with(command_line, tmp_path):
+def test_a_chunk_holds_the_cycles_that_a_run_began_with_and_is_written_once(command_line, tmp_path):
+    folder, written = tmp_path / "ensemble.zarr" / "cycle_energies" / "c" / "1", set()
     for cycles in (2, 5):
         summary_of(command_line(*lengthened(tmp_path, cycles)))
         energy = zarr.open_group(tmp_path / "ensemble.zarr", mode="r")["cycle_energies"]
         assert (energy.shape, energy.chunks) == ((N_LONG, cycles), (BLOCK, 2))
-    folder = tmp_path / "ensemble.zarr" / "cycle_energies" / "c" / "1"
+        written.add((folder / "0").stat().st_mtime_ns)
     assert sorted(path.name for path in folder.iterdir()) == ["0", "1", "2"]
+    assert len(written) == 1
 
 
 def test_what_is_kept_takes_the_room_that_the_page_says():

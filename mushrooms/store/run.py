@@ -190,9 +190,14 @@ class StoredRun:
         """
         if not self._arrays:
             self.describe()
-        number, first, n, _ = block_range
+        number, first, n, before = block_range
+        there = 0 if before is None else before.arrays["cycle_energies"].shape[1]
         for name in self.shape.names:
-            self._arrays[name][first : first + n] = block.arrays[name]
+            rows, array = self._arrays[name], block.arrays[name]
+            if there and "cycle" in FIELDS[name].dims:  # the chunks of earlier cycles stay
+                rows[first : first + n, there:] = array[:, there:]
+            else:
+                rows[first : first + n] = array
         sums = {name: _sum(block.arrays[name]) for name in self.shape.names}
         marker = Marker(self._identity, number, n, self.shape.n_cycles, sums, block.seconds)
         write_file(self._path(number), sealed(json.dumps(marker._asdict()).encode()))

@@ -31,7 +31,8 @@ from conformance.audit import session
 from conformance.audit.runs import SCENES
 from conformance.files import sealed, unsealed
 from fast.kernel.follow import LANE_ROWS
-from mushrooms import bench, orbits, output, questions
+from mushrooms import audit_ensemble, bench, orbits, output, questions
+from mushrooms.audit_ensemble import Options
 from mushrooms.main import run
 from mushrooms.output import LOCK, announce_compilation, locked
 from mushrooms.store import conduct
@@ -486,6 +487,11 @@ def test_exports_have_every_bit(command_line, stored, tmp_path):
     for name, column in wanted.items():
         for found in (rows, table):
             np.testing.assert_array_equal(np.asarray(found[name]), column)
+    for path in (tmp_path / "run.csv", tmp_path / "run.parquet", stored):  # and the audit reads them
+        given, _ = audit_ensemble.read(path, load("moving-cap"), Options(ENERGY, "v2/2", "scene", None))
+        takes_part = np.isfinite(ensemble.energy)
+        np.testing.assert_array_equal(given.s, np.log(ensemble.energy[takes_part] / ENERGY))
+        np.testing.assert_array_equal(given.t_in, ensemble.t_in[takes_part, 0, 0])
 
 
 @pytest.mark.parametrize(

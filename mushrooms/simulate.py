@@ -26,6 +26,7 @@ from mushrooms.output import (
     locked,
     print_pairs,
     progress_bar,
+    refuse_unheeded,
     writable_folder,
 )
 from mushrooms.store import conduct
@@ -51,11 +52,6 @@ class CliArgs(NamedTuple):
     block: int | None
     max_collisions: int | None
     max_seconds: float | None
-
-    @property
-    def n_threads(self) -> int:
-        """Return how many threads there are."""
-        return self.threads or os.cpu_count() or 1
 
     def watch(self, bar: Progress) -> Callable[[int], None]:
         """Return what shows the progress of the run."""
@@ -86,9 +82,7 @@ def simulate_scene(
             raise BadInput(f"--particles = {particles}, must be 1 to {MOST_IN_MEMORY}; more need --out")
         of_stored: dict[str, object] = {"--phases": phases, "--resume": resume or None, "--dask": dask}
         of_stored |= {"--block": block, "--max-collisions": max_collisions, "--max-seconds": max_seconds}
-        for option, value in of_stored.items():
-            if value is not None:
-                raise BadInput(f"{option} needs --out: without a folder nothing is kept")
+        refuse_unheeded(of_stored, "it needs --out, as without a folder nothing is kept")
     if plot is not None:
         if particles < 2:
             raise BadInput(f"--particles = {particles}, must be >= 2 for --plot")
@@ -131,8 +125,9 @@ def _in_memory(arguments: CliArgs) -> tuple[dict[str, Any], Gains]:
     with np.errstate(divide="ignore"):
         gains = np.log(found.cycle_energies[found.takes_part()] / spec.energy)
     tally = tally_of({**found._asdict(), "takes_part": found.takes_part()})
-    tell(careful_note(tally.careful, tally.collisions, found.seconds))
-    summary = _summary(spec, tally, found.seconds * found.threads, lambda: [gains], found.sha256())
+    seconds = found.seconds * found.threads
+    tell(careful_note(tally.careful, tally.collisions, seconds))
+    summary = _summary(spec, tally, seconds, lambda: [gains], found.sha256())
     return summary, lambda: [gains]
 
 
@@ -140,7 +135,7 @@ def _on_disk(arguments: CliArgs, folder: Path, resume: bool) -> tuple[dict[str, 
     """Bring the run in a folder to its end, or the command to its own; return its summary and gains."""
     spec, n = arguments.spec, arguments.particles
     command = spec.command(arguments.scene, n, folder)
-    default = conduct.block_of_new(spec, n, arguments.n_threads)
+    default = conduct.block_of_new(spec, n, arguments.threads or os.cpu_count() or 1)
     with named(folder), announce_compilation():
         run = conduct.open_or_create(folder, spec, n, arguments.block, default, command, resume)
     n_before = run.tally.particles
@@ -185,7 +180,7 @@ def _complete(arguments: CliArgs, run: StoredRun) -> None:
             max_seconds=arguments.max_seconds,
         )
     n_careful, n = run.tally.careful - before.careful, run.tally.collisions - before.collisions
-    tell(careful_note(n_careful, n, (run.seconds - seconds) / arguments.n_threads))
+    tell(careful_note(n_careful, n, run.seconds - seconds))
 
 
 def _summary(spec: RunSpec, tally: RunTally, seconds: float, gains: Gains, sha256: str) -> dict[str, Any]:

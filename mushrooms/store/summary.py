@@ -131,7 +131,7 @@ def _size(scene: Scene, t: float) -> tuple[float, float]:
 
 
 def careful_note(n_careful: int, n_collisions: int, seconds: float) -> str | None:
-    """Return a line on careful steps, if a run took a second and they took over a tenth of its time."""
+    """Return a line on careful steps if a run took a second of one core, a tenth of it for them, or more."""
     share = n_careful / max(n_collisions, 1)
     part = CAREFUL_COST * share / (1.0 + (CAREFUL_COST - 1.0) * share)
     if seconds < 1.0 or part <= 0.1:

@@ -321,18 +321,24 @@ KINDS = {"pdf": b"%PDF", "gif": b"GIF89a", "svg": b"<?xml", "png": b"\x89PNG"}
 
 
 OF_A_PATH = ("--trajectory", "--collisions", 20, "--seed", 4)
-CASES = list(itertools.product(KINDS, [(), OF_A_PATH]))
+CASES = [(suffix, "untilted", *kind) for suffix in KINDS for kind in ((), OF_A_PATH)]
+CASES += [("svg", name) for name in scenes.catalogue() if name != "moving-cap-as-printed"]
+NOT_DEEP = ("svg", "untilted", *OF_A_PATH), ("png", "untilted"), ("gif", "untilted"), ("svg", "ergodic")
 
 
-@pytest.mark.parametrize("case", deep_but(CASES, ("svg", OF_A_PATH), ("png", ()), ("gif", ())))
-def test_a_picture_has_the_kind_of_its_ending_and_the_same_bytes_again(command_line, tmp_path, case):
-    suffix, kind = case
-    path = tmp_path / f"path.{suffix}"
-    assert command_line("draw", "untilted", *kind, "--out", path).code == 0
+@pytest.mark.parametrize("case", deep_but(CASES, *NOT_DEEP))
+def test_every_scene_has_a_picture_of_any_kind_and_the_same_bytes_again(
+    command_line, tmp_path, monkeypatch, case
+):
+    suffix, name, *options = case
+    monkeypatch.chdir(tmp_path)
+    path, out = tmp_path / f"{name}.{suffix}", [] if suffix == "svg" else ["--out", f"{name}.{suffix}"]
+    ended = command_line("draw", name, *options, *out)
+    assert (ended.code, ended.out, list(tmp_path.iterdir())) == (0, f"{path.name}\n", [path])
     first = path.read_bytes()
     assert first.startswith(KINDS[suffix])
     if suffix != "gif":  # whose frames take longer
-        command_line("draw", "untilted", *kind, "--out", path)
+        command_line("draw", name, *options, *out)
         assert path.read_bytes() == first
 
 
@@ -486,30 +492,23 @@ def test_the_page_says_what_the_code_finds():
 
 
 @pytest.mark.parametrize(
-    ("number", "text"), [(50.0, "50"), (2500.0, "2500"), (1e5, "$10^{5}$"), (2.5e-7, r"$2.5\cdot10^{-7}$")]
-)
-def test_energies_are_written_as_powers(number, text):
-    assert style.power(number) == text
-
-
-@pytest.mark.parametrize(
-    ("text", "html"),
+    ("write", "given", "text"),
     [
-        ("p_nc", "<i>p</i><sub>nc</sub>"),
-        ("E0^(-1/4)", "<i>E</i><sub>0</sub><sup>−1/4</sup>"),
-        ("dV_ell / V_cha", "<i>dV</i><sub>ell</sub> / <i>V</i><sub>cha</sub>"),
-        ("log E1/E0", "log <i>E</i><sub>1</sub>/<i>E</i><sub>0</sub>"),
-        ("sigma_w <= 10^-25", "<i>σ</i><sub>w</sub> ≤ 10<sup>−25</sup>"),
-        ("x^2 + y^2", "x<sup>2</sup> + y<sup>2</sup>"),
-        ("nu(t)", "<i>ν</i>(t)"),
-        ("<script>a_b</script>", "&lt;script&gt;<i>a</i><sub>b</sub>&lt;/script&gt;"),
-        *((prose, prose) for prose in ("M1 and X2, see L7", "theory/equations.md", "sec. 4.1", "numbers")),
-        *((prose, prose) for prose in ("minus 3 sd at n = 30", "moving-cap@1e7")),
+        *((style.power, *row) for row in ((50.0, "50"), (2500.0, "2500"), (1e5, "$10^{5}$"))),
+        (style.power, 2.5e-7, r"$2.5\cdot10^{-7}$"),
+        (as_json, {"notes": "the captions' nu, größer"}, '{"notes": "the captions\' nu, größer"}'),
+        (typeset, "p_nc", "<i>p</i><sub>nc</sub>"),
+        (typeset, "E0^(-1/4)", "<i>E</i><sub>0</sub><sup>−1/4</sup>"),
+        (typeset, "dV_ell / V_cha", "<i>dV</i><sub>ell</sub> / <i>V</i><sub>cha</sub>"),
+        (typeset, "log E1/E0", "log <i>E</i><sub>1</sub>/<i>E</i><sub>0</sub>"),
+        (typeset, "sigma_w <= 10^-25", "<i>σ</i><sub>w</sub> ≤ 10<sup>−25</sup>"),
+        (typeset, "x^2 + y^2", "x<sup>2</sup> + y<sup>2</sup>"),
+        (typeset, "nu(t)", "<i>ν</i>(t)"),
+        (typeset, "<script>a_b</script>", "&lt;script&gt;<i>a</i><sub>b</sub>&lt;/script&gt;"),
+        *((typeset, prose, prose) for prose in ("M1 and X2, see L7", "theory/equations.md", "sec. 4.1")),
+        *((typeset, prose, prose) for prose in ("numbers", "minus 3 sd at n = 30", "moving-cap@1e7")),
     ],
 )
-def test_formulas_are_typeset_prose_is_left_alone_and_markup_escaped(text, html):
-    assert typeset(text) == html
-
-
-def test_scenes_are_written_as_a_reader_sees_them():
-    assert as_json({"notes": "the captions' nu, größer"}) == '{"notes": "the captions\' nu, größer"}'
+def test_numbers_data_and_formulas_are_written_as_a_reader_sees_them(write, given, text):
+    """Prose is left alone, and markup escaped."""
+    assert write(given) == text

@@ -143,18 +143,6 @@ def test_simulate_prints_and_saves_the_same_result(command_line, tmp_path):
     assert (one["m1_se"], one["p_nc"]) == (None, None)  # what one particle in a cap cannot tell
 
 
-DRAWABLE = [name for name in scenes.catalogue() if name != "moving-cap-as-printed"]
-
-
-@pytest.mark.parametrize("name", deep_but(DRAWABLE, "fixed-cap-clockwise"))
-def test_every_scene_can_be_drawn(command_line, tmp_path, monkeypatch, name):
-    monkeypatch.chdir(tmp_path)
-    code, out, _ = command_line("draw", name)
-    assert (code, out) == (0, f"{name}.svg\n")
-    assert "</svg>" in (tmp_path / f"{name}.svg").read_text("utf-8")
-    assert os.listdir(tmp_path) == [f"{name}.svg"]
-
-
 def test_the_version_is_printed(command_line):
     assert re.fullmatch(r"mushrooms \d\S*\n", command_line("--version").out)
 

@@ -124,7 +124,7 @@ def _in_memory(arguments: CliArgs) -> tuple[dict[str, Any], Gains]:
         )
     with np.errstate(divide="ignore"):
         gains = np.log(found.cycle_energies[found.takes_part()] / spec.energy)
-    tally = tally_of({**found._asdict(), "takes_part": found.takes_part()})
+    tally = tally_of(found)
     seconds = found.seconds * found.threads
     tell(careful_note(tally.careful, tally.collisions, seconds))
     summary = _summary(spec, tally, seconds, lambda: [gains], found.sha256())

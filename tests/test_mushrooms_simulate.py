@@ -36,7 +36,7 @@ from mushrooms.audit_ensemble import Options
 from mushrooms.main import run
 from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct
-from mushrooms.store.run import DESCRIPTION, GROUP, MARKERS, Block, StoredRun
+from mushrooms.store.run import DESCRIPTION, GROUP, MARKERS, StoredRun
 from mushrooms.store.spec import RunSpec, shape_of
 from mushrooms.store.summary import (
     Gain,
@@ -270,15 +270,15 @@ def test_a_block_is_reported_at_once_and_two_are_in_memory(tmp_path, monkeypatch
     """Not when it has been written: progress would fall back by a block."""
     begun, told, kept = [], [], []
     spec = RunSpec(load("fermi-ulam"), 1e3, 1, 0)
-    arrays = {"wall_counts": np.zeros((3, 5)), "outcome": np.zeros(3), "n_careful": np.zeros(3)}
 
     def engine(_spec, block_ranges, _on_progress):
         for number, block_range in enumerate(block_ranges):
-            begun.append(weakref.ref(takes_part := np.ones(3)))
+            block = fast.go_on(spec.scene, n_particles=3, energy=1e3)
+            begun.append(weakref.ref(block.lanes))
             assert told == list(range(3, 3 * number + 1, 3))
             assert sum(ref() is not None for ref in begun) <= 2
-            yield block_range, Block({**arrays, "takes_part": takes_part}, 0.0)
-            del takes_part
+            yield block_range, block
+            del block
 
     def keep(_run, block_range, _block):
         time.sleep(0.01)

@@ -457,7 +457,7 @@ def of_others(arrays, *more):
     [
         (fast, "go_on", with_other_numbers),
         *(
-            (conduct, "paused_of", faulty)
+            (stored, "paused_of", faulty)
             for faulty in (forgotten(pools.VX), forgotten(pools.PHASE_SINE), of_others)
         ),
     ],

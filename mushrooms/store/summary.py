@@ -11,7 +11,7 @@ import numpy.typing as npt
 from mpmath import fp
 
 import theory
-from fast.ensemble import FOLLOWED, UNDECIDED
+from fast.ensemble import FOLLOWED, UNDECIDED, Ensemble
 from fast.starts import one_cycle
 from mushrooms.store.spec import RunSpec
 from scene import BadInput, Cap, Mushroom, Scene, Stem
@@ -42,18 +42,17 @@ class RunTally(NamedTuple):
         return RunTally(*(a + b for a, b in zip(self, other, strict=True)))
 
 
-def tally_of(arrays: dict[str, npt.NDArray[Any]]) -> RunTally:
-    """Return the tally of particles, given the arrays that a store keeps of them."""
-    n_collisions, takes_part = arrays["wall_counts"].sum(axis=1), arrays["takes_part"] == 1
-    was_followed = arrays["outcome"] == FOLLOWED
+def tally_of(found: Ensemble) -> RunTally:
+    """Return the tally of an ensemble."""
+    was_followed = found.outcome == FOLLOWED
     return RunTally(
-        particles=len(n_collisions),
+        particles=len(found.outcome),
         followed=int(was_followed.sum()),
-        undecided=int((arrays["outcome"] == UNDECIDED).sum()),
-        collisions=int(n_collisions.sum()),
-        careful=int(arrays["n_careful"].sum()),
-        met=int(n_collisions[was_followed].sum()),
-        captured=int(np.isfinite(arrays["t_in"][takes_part]).any(axis=2).sum()) if "t_in" in arrays else 0,
+        undecided=int((found.outcome == UNDECIDED).sum()),
+        collisions=int(found.n_collisions.sum()),
+        careful=int(found.n_careful.sum()),
+        met=int(found.n_collisions[was_followed].sum()),
+        captured=int(np.isfinite(found.t_in[found.takes_part()]).any(axis=2).sum()),
     )
 
 

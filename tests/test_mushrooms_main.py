@@ -128,11 +128,8 @@ def test_simulate_prints_and_saves_the_same_result(command_line, tmp_path):
         "particles", "collisions", "lost", "undecided", "careful", "collision_time", "m1", "m1_se",
         "m1_theory", "m1_z", "p_nc", "p_nc_se", "p_nc_theory", "p_nc_z", "ns_per_collision", "sha256",
     ]  # fmt: skip
-    names = ["blocks", "ensemble.zarr", "summary.json"]
-    assert sorted(entry.name for entry in (tmp_path / "run").iterdir()) == names
     saved = json.loads((tmp_path / "run" / "summary.json").read_text())
-    assert saved.items() >= summary.items()
-    assert saved["seed"] == 7
+    assert saved.items() >= {**summary, "seed": 7}.items()
     assert scenes.from_data(saved["scene"]) == scenes.load("moving-cap")
     found = fast.simulate(scenes.load("moving-cap"), n_particles=40, energy=1e4, seed=7)
     assert np.log(found.energy / 1e4).mean() == pytest.approx(summary["m1"], rel=1e-12)

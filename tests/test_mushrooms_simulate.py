@@ -157,15 +157,6 @@ def test_energies_drawn_from_theory_agree_with_it(n_cycles, energy):
     assert pulls["moving-cap-reversed"] > 3.5
 
 
-def test_the_limit_of_high_energies_has_no_z():
-    beside = measured(RunSpec(load("untilted"), 1e4, 1, 1), 60, gain(np.linspace(-1, 1, 100)))
-    assert beside["m1_theory"] == pytest.approx(0.19134361)
-    assert (beside["m1_z"], beside["p_nc_z"]) == (None, None)
-    assert (beside["p_nc"], beside["p_nc_se"]) == (pytest.approx(0.4), pytest.approx(0.24**0.5 / 10))
-    nothing = measured(RunSpec(load("breathing-circle"), 1e4, 1, 1), 0, Gain())
-    assert set(nothing.values()) == {None}
-
-
 def turned(phase):
     """Return a mushroom whose cycle begins at a phase of its mouth's, the widest at 0."""
 
@@ -202,15 +193,29 @@ def test_a_cycle_that_begins_at_a_narrow_mouth_is_another_one():
 NEVER_NARROWS = Mushroom(r=1.0, h=Fourier(mean=1.0, omega=1.0, sin=(0.5,)), nu=0.5, slope=0.1)
 
 
+NOT_KNOWN = dict.fromkeys(("m1", "m1_se", "m1_theory", "m1_z", "p_nc", "p_nc_se", "p_nc_theory", "p_nc_z"))
+
+
 @pytest.mark.parametrize(
-    ("scene", "captured", "error"),
-    [(turned(0.0), 0, 1 / 21), (turned(0.0), 20, 1 / 21), (NEVER_NARROWS, 0, 0.0)],
+    ("scene", "captured", "gains", "wanted"),
+    [
+        # The limit of high energies has no z.
+        (
+            *(load("untilted"), 60, np.linspace(-1, 1, 100)),
+            {"m1_theory": 0.19134361, "m1_z": None, "p_nc": 0.4, "p_nc_se": 0.24**0.5 / 10, "p_nc_z": None},
+        ),
+        (load("breathing-circle"), 0, np.empty(0), NOT_KNOWN),
+        # A share of particles that were all alike has an error, unless it is known: of twenty that are free,
+        # where one in 300 is captured, none is.
+        (turned(0.0), 0, np.linspace(-1, 1, 20), {"p_nc": 1.0, "p_nc_se": 1 / 21}),
+        (turned(0.0), 20, np.linspace(-1, 1, 20), {"p_nc": 0.0, "p_nc_se": 1 / 21}),
+        (NEVER_NARROWS, 0, np.linspace(-1, 1, 20), {"p_nc": 1.0, "p_nc_se": 0.0}),
+    ],
 )
-def test_a_share_of_particles_that_were_all_alike_has_an_error_unless_it_is_known(scene, captured, error):
-    """Of twenty that are free, where one in 300 is captured, none is: it told 1 with an error of 0."""
-    beside = measured(RunSpec(scene, 1e6, 1, 1), captured, gain(np.linspace(-1, 1, 20)))
-    assert beside["p_nc"] == 1 - captured / 20
-    assert beside["p_nc_se"] == pytest.approx(error)
+def test_what_is_measured_has_errors_and_z_where_they_are_known(scene, captured, gains, wanted):
+    found = measured(RunSpec(scene, 1e4, 1, 1), captured, gain(gains))
+    for name, value in wanted.items():
+        assert found[name] == (value if value is None else pytest.approx(value)), name
 
 
 @pytest.mark.parametrize("n", [1, 100])  # one particle's m1 has no error, and so no z

@@ -20,7 +20,6 @@ from typing import Any
 import distributed
 import numpy as np
 import pytest
-import xarray
 from pyarrow import parquet
 from support.depth import deep_but
 from support.refusals import assert_refused
@@ -451,18 +450,6 @@ def test_no_scheduler_is_one_line(command_line, tmp_path, monkeypatch, address):
     assert_refused(ended, f"--dask = {address}", "no scheduler")
 
 
-def test_xarray_reads_names_and_what_was_run(stored):
-    """The bits: test_mushrooms_store.py."""
-    run = xarray.open_zarr(stored / "ensemble.zarr")
-    sizes = {"particle": N, "cycle": 1, "narrowing": 1, "wall": 5, "row": LANE_ROWS, "phase": 2}
-    assert dict(run.sizes) == sizes
-    assert run.phase_captured.dims == ("particle", "cycle", "phase")
-    assert run.attrs["phases"] == [0.25, 0.5]
-    assert (run.attrs["seed"], run.attrs["scene"]["name"]) == (SEED, "moving-cap")
-    assert "--seed 5" in run.attrs["command"]
-    assert set(run.attrs["versions"]) >= {"oscillating-mushrooms", "numpy", "numba", "python"}
-
-
 def test_exports_have_every_bit(command_line, stored, tmp_path):
     phases = (0.25, 0.5)
     ensemble = fast.simulate(load("moving-cap"), n_particles=N, energy=ENERGY, seed=SEED, phases=phases)
@@ -571,8 +558,8 @@ def test_a_run_killed_at_random_moments_goes_on_to_the_same_bits(tmp_path):
         assert json.loads(done.stdout)["sha256"] == wanted
 
 
-def test_the_page_s_python_plots_a_histogram(stored, monkeypatch, ensemble):
-    """A few lines, run where the page says, on a run that is there; p_nc is that of the ensemble."""
+def test_xarray_reads_names_and_what_was_run_and_the_page_s_python_plots_it(stored, monkeypatch, ensemble):
+    """A few lines, run where the page says; p_nc is that of the ensemble. Bits: test_mushrooms_store.py."""
     text = (DOCS / "ensembles.md").read_text("utf-8")
     (snippet,) = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     assert sum(map(bool, snippet.splitlines())) < 9
@@ -581,3 +568,11 @@ def test_the_page_s_python_plots_a_histogram(stored, monkeypatch, ensemble):
     exec(snippet, names)
     assert names["p_nc"].values == pytest.approx(ensemble.p_nc())
     assert (stored.parent / "histogram.png").stat().st_size > 5000
+    run = names["run"]
+    sizes = {"particle": N, "cycle": 1, "narrowing": 1, "wall": 5, "row": LANE_ROWS, "phase": 2}
+    assert dict(run.sizes) == sizes
+    assert run.phase_captured.dims == ("particle", "cycle", "phase")
+    assert (run.attrs["phases"], run.attrs["seed"]) == ([0.25, 0.5], SEED)
+    assert run.attrs["scene"]["name"] == "moving-cap"
+    assert "--seed 5" in run.attrs["command"]
+    assert set(run.attrs["versions"]) >= {"oscillating-mushrooms", "numpy", "numba", "python"}

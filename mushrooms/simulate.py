@@ -83,10 +83,9 @@ def simulate_scene(
         of_stored: dict[str, object] = {"--phases": phases, "--resume": resume or None, "--dask": dask}
         of_stored |= {"--block": block, "--max-collisions": max_collisions, "--max-seconds": max_seconds}
         refuse_unheeded(of_stored, "it needs --out, as without a folder nothing is kept")
-    if plot is not None:
-        if particles < 2:
-            raise BadInput(f"--particles = {particles}, must be >= 2 for --plot")
-        check_file(plot, (".svg", ".png"))
+    if plot is not None and particles < 2:
+        raise BadInput(f"--particles = {particles}, must be >= 2 for --plot")
+    check_file(plot, (".svg", ".png"))
     spec = RunSpec(scene_named(scene), energy, cycles, seed, _phases(phases))
     arguments = CliArgs(scene, spec, particles, threads, dask, block, max_collisions, max_seconds)
     if out is None:
@@ -95,6 +94,7 @@ def simulate_scene(
         with writable_folder(out) as folder, locked(folder):
             summary, gains = _on_disk(arguments, folder, resume)
     print_pairs(summary, as_json)
+    tell(careful_note(summary))
     tell(explain_limit(spec, summary))
     if plot is not None:
         draw_energies(plot, spec, iter(gains()), particles)
@@ -124,11 +124,8 @@ def _in_memory(arguments: CliArgs) -> tuple[dict[str, Any], Gains]:
         )
     with np.errstate(divide="ignore"):
         gains = np.log(found.cycle_energies[found.takes_part()] / spec.energy)
-    tally = tally_of(found)
     seconds = found.seconds * found.threads
-    tell(careful_note(tally.careful, tally.collisions, seconds))
-    summary = _summary(spec, tally, seconds, lambda: [gains], found.sha256())
-    return summary, lambda: [gains]
+    return _summary(spec, tally_of(found), seconds, lambda: [gains], found.sha256()), lambda: [gains]
 
 
 def _on_disk(arguments: CliArgs, folder: Path, resume: bool) -> tuple[dict[str, Any], Gains]:
@@ -167,7 +164,6 @@ def _how_to_resume(run: StoredRun, command: str) -> str:
 
 def _complete(arguments: CliArgs, run: StoredRun) -> None:
     """Follow what a run lacks."""
-    before, seconds = run.tally, run.seconds
     engine: conduct.Engine = partial(conduct.in_process, threads=arguments.threads)
     if arguments.dask:
         engine = partial(conduct.by_dask, address=arguments.dask, threads=arguments.threads)
@@ -179,8 +175,6 @@ def _complete(arguments: CliArgs, run: StoredRun) -> None:
             max_collisions=arguments.max_collisions,
             max_seconds=arguments.max_seconds,
         )
-    n_careful, n = run.tally.careful - before.careful, run.tally.collisions - before.collisions
-    tell(careful_note(n_careful, n, run.seconds - seconds))
 
 
 def _summary(spec: RunSpec, tally: RunTally, seconds: float, gains: Gains, sha256: str) -> dict[str, Any]:

@@ -276,11 +276,9 @@ def to_text(data: Data) -> str:
 
 
 def _failed(finding: Data) -> list[str]:
-    def is_wrong(check: Data) -> bool:
-        return bool((check["holds"] is not True) != (check["form"] == "printed"))
-
+    """Return a line for each check that does not come out as its form asks: what is printed must fail."""
     return [
         f"{check['form']}: {check['what']}: {figures_text(check)}, expected {check['expected']}"
         for check in finding["checks"]
-        if is_wrong(check)
+        if (check["holds"] is not True) != (check["form"] == "printed")
     ]

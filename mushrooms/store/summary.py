@@ -129,9 +129,14 @@ def _size(scene: Scene, t: float) -> tuple[float, float]:
     return float(now.cap_area() + now.stem_area()), float(top + (0 if isinstance(scene, Cap) else stem))
 
 
-def careful_note(n_careful: int, n_collisions: int, seconds: float) -> str | None:
-    """Return a line on careful steps if a run took a second of one core, a tenth of it for them, or more."""
-    share = n_careful / max(n_collisions, 1)
+def careful_note(summary: Mapping[str, Any]) -> str | None:
+    """Return a line on careful steps if a run took a second of one core, a tenth of it for them, or more.
+
+    Args:
+        summary: as `mushrooms simulate` prints it.
+    """
+    seconds = summary["ns_per_collision"] * summary["collisions"] / 1e9
+    share = summary["careful"] / max(summary["collisions"], 1)
     part = CAREFUL_COST * share / (1.0 + (CAREFUL_COST - 1.0) * share)
     if seconds < 1.0 or part <= 0.1:
         return None

@@ -150,7 +150,6 @@ class StoredRun:
     def check(self) -> list[int]:
         """Read every block, count those that are as they were written, and return the damaged ones."""
         damaged = []
-        self._markers, self.tally, self.seconds = {}, RunTally(), 0.0
         for pattern in (".*.part", "*.partial"):  # what we, or zarr, were writing when the process ended
             for path in self.folder.rglob(pattern):
                 path.unlink(missing_ok=True)
@@ -192,9 +191,14 @@ class StoredRun:
     def describe(self) -> None:
         """Write the metadata of the group and of its arrays; chunks that are there stay."""
         (self.folder / MARKERS).mkdir(exist_ok=True)
-        sizes = {"particles": self.shape.n_particles, "block": self.shape.block}
-        sizes |= {"cycles_of_a_chunk": self.shape.chunked}
-        attributes = self.spec.to_data() | sizes | {"command": self.command} | made_by()
+        attributes = {
+            **self.spec.to_data(),
+            "particles": self.shape.n_particles,
+            "block": self.shape.block,
+            "cycles_of_a_chunk": self.shape.chunked,
+            "command": self.command,
+            **made_by(),
+        }
         write_file(self.folder / MARKERS / DESCRIPTION, sealed(json.dumps(attributes).encode()))
         for path in (self.folder / GROUP).rglob("zarr.json"):
             path.unlink()
@@ -376,7 +380,6 @@ def open_run(folder: Path) -> StoredRun:
     return run
 
 
-MAX_COLUMNS = 10_000
 TIMES = ("seconds", "threads")
 
 
@@ -389,14 +392,10 @@ def write_npz(run: StoredRun, file: BinaryIO) -> None:
 
 def _tables(run: StoredRun) -> Iterator[Arrays]:
     """Yield each block as columns by their names."""
-    shape, names = run.shape, [name for name in run.shape.names if name != LANES]
-    n_columns = sum(int(np.prod(shape.of(name, 1, shape.n_cycles))) for name in names)
-    if n_columns > MAX_COLUMNS:
-        raise BadInput(f"a table of {n_columns} columns, must be at most {MAX_COLUMNS}: read it with xarray")
-    for number in range(shape.n_blocks):
-        first = number * shape.block
-        table: Arrays = {"particle": np.arange(first, first + shape.rows(number))}
-        for name in names:
+    for number in range(run.shape.n_blocks):
+        first = number * run.shape.block
+        table: Arrays = {"particle": np.arange(first, first + run.shape.rows(number))}
+        for name in [name for name in run.shape.names if name != LANES]:
             array = run.read(number, name)
             for place in product(*map(range, array.shape[1:])):
                 words = [WALLS[i] if FIELDS[name].dims[-1] == "wall" else str(i + 1) for i in place]
@@ -409,7 +408,7 @@ def export_run(run: Path, to: Path) -> None:
     """Write a finished run as one table.
 
     Raises:
-        BadInput: a block is damaged, a table has too many columns, or pyarrow is not installed.
+        BadInput: a block is damaged, or pyarrow is not installed.
     """
     check_file(to, (".parquet", ".csv", ".npz"))
     found = open_run(run)

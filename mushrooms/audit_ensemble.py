@@ -58,7 +58,7 @@ ENERGIES, GAIN = "E1", "s"
 # What a column may be called; of several minima of nu or capture intervals the earliest counts.
 NAMES = {
     "E0": r"E_?0|e0|energy_?0",
-    ENERGIES: r"E_?[1-9]\d*|e[1-9]\d*|energy(_[1-9]\d*)?",
+    ENERGIES: r"E_?[1-9]\d*|e[1-9]\d*|(energy|cycle_energies)(_[1-9]\d*)?",
     GAIN: r"s|log_E1_E0|log_gain",
     "t_in": r"t_in(_1(_\d+)?)?",
     "t_out": r"t_out(_1(_\d+)?)?",
@@ -393,5 +393,6 @@ def _zarr(path: Path, label: str) -> Iterator[dict[str, Floats]]:
         raise BadInput(f"{label}: arrays of {lengths} particles, must be as many in each")
     for first in range(0, next(iter(lengths.values())), PART):
         part = {name: np.asarray(array[first : first + PART], np.float64) for name, array in arrays.items()}
-        is_first = {name: name.startswith("energy") or values.ndim == 1 for name, values in part.items()}
-        yield {name: values if is_first[name] else values[:, 0] for name, values in part.items()}
+        for name, values in part.items():
+            part[name] = values if values.ndim == 1 or name == "cycle_energies" else values[:, 0]
+        yield part

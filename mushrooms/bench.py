@@ -147,11 +147,9 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
             continue
         try:
             found.append(by_command(name, "example", example.command, stack, limits))
+            built |= {name: example.built} if example.built else {}
         except (CheckFailure, BadInput) as failure:
             not_run[name] = str(failure)
-            continue
-        if example.built:
-            built[name] = example.built
     if command:
         try:
             name = f"command {' '.join(command)}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -90,21 +90,19 @@ def draw_scene(
     if is_run(Path(name)):
         asked = {f"--{kind}": True for kind in kinds} | {"--export": export}
         refuse_unheeded(asked | options.given(), f"{name!r} is a run")
-        print(_draw_run(Path(name), out))
+        _draw_run(Path(name), out)
         return
     scene = scene_named(name)
     _check_heeded(kinds, export, options)
     check_file(export, tuple(TABLES))
-    paths: dict[str, Path] = {}
-    if kinds or export is None or out is not None:
-        _check_drawable(scene)
-        paths = _paths(out or Path(f"{Path(name).stem}.svg"), kinds)
+    is_drawn = kinds or export is None or out is not None
+    paths = _paths(scene, out or Path(f"{Path(name).stem}.svg"), kinds) if is_drawn else {}
     with announce_compilation():
         if export is not None:
             options.follow(scene, "trajectory", 1)[0].write(export)
             print(export)
         for kind, path in paths.items():
-            write_file(path, _picture(kind, path.suffix, scene, options))
+            write_file(path, partial(_draw, kind, path.suffix, scene, options))
             print(path)
 
 
@@ -120,31 +118,26 @@ def _check_heeded(kinds: list[str], export: Path | None, options: DrawOptions) -
         refuse_unheeded(options.given(), "the picture of the walls has no particles")
 
 
-def _draw_run(folder: Path, out: Path | None) -> Path:
-    """Draw the energies of a stored run, with theory; return the file's path."""
+def _draw_run(folder: Path, out: Path | None) -> None:
+    """Draw the energies of a stored run, with theory, and print the file's name."""
     path = out or Path(f"{folder.resolve().name}.svg")
     check_file(path, (".svg", ".png"))
     run = open_run(folder)
     draw_energies(path, run.spec, run.gains(), run.shape.n_particles)
-    return path
+    print(path)
 
 
-def _check_drawable(scene: Scene) -> None:
-    """Refuse lengths and periods whose squares or sums a figure cannot hold."""
-    found = {f"scene.{name}": bounds(law).highest for name, law in laws(scene).items() if name != "slope"}
-    if scene.period:
-        found["period"] = scene.period
-    for name, size in found.items():
-        if not LEAST_DRAWN <= size <= 1 / LEAST_DRAWN:
-            raise BadInput(f"{name} = {size:.3g}, must be 1e-100 to 1e+100 in a picture")
-
-
-def _paths(out: Path, kinds: list[str]) -> dict[str, Path]:
+def _paths(scene: Scene, out: Path, kinds: list[str]) -> dict[str, Path]:
     """Return the file of each picture; several get their names into that of the one given.
 
     Raises:
-        BadInput: one of them cannot be written, or does not move and is to be a .gif.
+        BadInput: one of them cannot be drawn, or not written, or does not move and is to be a .gif.
     """
+    found = {f"scene.{name}": bounds(law).highest for name, law in laws(scene).items() if name != "slope"}
+    found |= {"period": scene.period} if scene.period else {}
+    for name, size in found.items():  # squares and sums of them are in a figure
+        if not LEAST_DRAWN <= size <= 1 / LEAST_DRAWN:
+            raise BadInput(f"{name} = {size:.3g}, must be 1e-100 to 1e+100 in a picture")
     paths = dict.fromkeys(kinds or ["walls"], out)
     if len(kinds) > 1:
         paths = {kind: out.with_stem(f"{out.stem}-{kind}") for kind in kinds}
@@ -154,30 +147,30 @@ def _paths(out: Path, kinds: list[str]) -> dict[str, Path]:
     return paths
 
 
-def _picture(kind: str, suffix: str, scene: Scene, options: DrawOptions) -> Callable[[BinaryIO], object]:
-    """Return what writes a picture."""
+def _draw(kind: str, suffix: str, scene: Scene, options: DrawOptions, file: BinaryIO) -> None:
+    """Draw one kind of picture into an open file."""
     if kind == "walls":
-        return lambda file: tables.write_picture(scene, suffix, file)
-    if kind == "trajectory" and suffix == ".gif":
-        [orbit] = options.follow(scene, kind, 1)
-        return lambda file: pictures.write_animation(orbit, file)
-    figure = _figure(kind, scene, options)
-    return lambda file: style.save(figure, file, suffix)
+        tables.write_picture(scene, suffix, file)
+    elif kind == "trajectory" and suffix == ".gif":
+        pictures.write_animation(options.follow(scene, kind, 1)[0], file)
+    elif kind == "growth" and options.particles != 1:
+        style.save(_growth(scene, options), file, suffix)
+    else:
+        style.save(_figure(kind, scene, options), file, suffix)
 
 
 def _figure(kind: str, scene: Scene, options: DrawOptions) -> Figure:
-    """Return a picture of particles."""
-    if kind == "growth" and options.particles != 1:
-        return _growth(scene, options)
+    """Return a picture of the paths of particles."""
     found = options.follow(scene, kind, 1 if kind in ("trajectory", "growth") else None)
-    if kind == "trajectory":
-        return pictures.trajectory(found[0])
-    if kind == "growth":
-        return pictures.energy_in_time(found[0])
-    if kind == "section":
-        return pictures.section(found, options.phase)
-    if kind == "map":
-        return pictures.collision_map(found)
+    match kind:
+        case "trajectory":
+            return pictures.trajectory(found[0])
+        case "growth":
+            return pictures.energy_in_time(found[0])
+        case "section":
+            return pictures.section(found, options.phase)
+        case "map":
+            return pictures.collision_map(found)
     with progress_bar() as bar:
         task = bar.add_task("Jacobians", total=sum(len(orbit.walls) for orbit in found))
         return pictures.exponents(found, lambda n: bar.update(task, completed=n))

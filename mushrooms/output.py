@@ -293,15 +293,14 @@ def write_csv(tables: Iterable[Mapping[str, Any]], file: BinaryIO, *, scene: str
         file: open for binary writing.
         scene: has no place in a CSV file.
     """
-    text = io.TextIOWrapper(file, encoding="utf-8", newline="")
-    writer = csv.writer(text, lineterminator="\n")
     for number, columns in enumerate(tables):
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
         if number == 0:
             writer.writerow(columns)
         lists = (column.tolist() if hasattr(column, "tolist") else column for column in columns.values())
         writer.writerows(zip(*lists, strict=True))
-    text.flush()
-    text.detach()
+        file.write(text.getvalue().encode())
 
 
 def write_parquet(tables: Iterable[Mapping[str, Any]], file: BinaryIO, *, scene: str = "") -> None:
@@ -323,8 +322,6 @@ TABLES = {".csv": write_csv, ".parquet": write_parquet}  # writers, by the endin
 
 
 def _remove_empty(folders: list[Path]) -> None:
-    for folder in folders:
-        try:
+    with suppress(OSError):  # one that is not empty stays, and so do those around it
+        for folder in folders:
             folder.rmdir()
-        except OSError:
-            return

@@ -8,11 +8,10 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import typer
-from rich.progress import Progress
 
 import fast
 from conformance.audit.runs import scene_named
@@ -26,6 +25,7 @@ from mushrooms.output import (
     locked,
     print_pairs,
     progress_bar,
+    refuse_unheeded,
     writable_folder,
 )
 from mushrooms.store import conduct
@@ -38,29 +38,6 @@ Gains = Callable[[], Iterable[Any]]  # returns ln(E/E0) after each cycle, block 
 MOST_IN_MEMORY = 10**8  # particles
 LIMITED = 3  # exit code of a run that a limit has stopped
 NO_BLOCK = "no block was finished: raise the limit, or begin in another folder with a smaller --block"
-
-
-class CliArgs(NamedTuple):
-    """The arguments of `simulate`, checked; `spec` is all that decides the bits, the others as given."""
-
-    scene: str
-    spec: RunSpec
-    particles: int
-    threads: int | None
-    dask: str | None
-    block: int | None
-    max_collisions: int | None
-    max_seconds: float | None
-
-    @property
-    def n_threads(self) -> int:
-        """Return how many threads there are."""
-        return self.threads or os.cpu_count() or 1
-
-    def watch(self, bar: Progress) -> Callable[[int], None]:
-        """Return what shows the progress of the run."""
-        watch = Watch(bar, self.spec.scene.name or self.scene, "particles")
-        return lambda n_done: watch.update(n_done, self.particles)
 
 
 def simulate_scene(
@@ -86,21 +63,27 @@ def simulate_scene(
             raise BadInput(f"--particles = {particles}, must be 1 to {MOST_IN_MEMORY}; more need --out")
         of_stored: dict[str, object] = {"--phases": phases, "--resume": resume or None, "--dask": dask}
         of_stored |= {"--block": block, "--max-collisions": max_collisions, "--max-seconds": max_seconds}
-        for option, value in of_stored.items():
-            if value is not None:
-                raise BadInput(f"{option} needs --out: without a folder nothing is kept")
-    if plot is not None:
-        if particles < 2:
-            raise BadInput(f"--particles = {particles}, must be >= 2 for --plot")
-        check_file(plot, (".svg", ".png"))
+        refuse_unheeded(of_stored, "it needs --out, as without a folder nothing is kept")
+    if plot is not None and particles < 2:
+        raise BadInput(f"--particles = {particles}, must be >= 2 for --plot")
+    check_file(plot, (".svg", ".png"))
     spec = RunSpec(scene_named(scene), energy, cycles, seed, _phases(phases))
-    arguments = CliArgs(scene, spec, particles, threads, dask, block, max_collisions, max_seconds)
+    name = spec.scene.name or scene
     if out is None:
-        summary, gains = _in_memory(arguments)
+        summary, gains = _in_memory(spec, name, particles, threads)
     else:
-        with writable_folder(out) as folder, locked(folder):
-            summary, gains = _on_disk(arguments, folder, resume)
+        engine: conduct.Engine = partial(conduct.in_process, threads=threads)
+        if dask:
+            engine = partial(conduct.by_dask, address=dask, threads=threads)
+        limits: dict[str, Any] = {"max_collisions": max_collisions, "max_seconds": max_seconds}
+        default = conduct.block_of_new(spec, particles, threads or os.cpu_count() or 1)
+        command = spec.command(scene, particles, out)
+        with writable_folder(out), locked(out):
+            with named(out), announce_compilation():
+                run = conduct.open_or_create(out, spec, particles, block, default, command, resume)
+            summary, gains = _on_disk(run, name, partial(conduct.complete, run, engine, **limits))
     print_pairs(summary, as_json)
+    tell(careful_note(summary))
     tell(explain_limit(spec, summary))
     if plot is not None:
         draw_energies(plot, spec, iter(gains()), particles)
@@ -115,77 +98,56 @@ def _phases(text: str | None) -> tuple[float, ...]:
         raise BadInput(f"--phases = {text}, must be numbers that rise and lie in (0, 1)") from None
 
 
-def _in_memory(arguments: CliArgs) -> tuple[dict[str, Any], Gains]:
+def _in_memory(
+    spec: RunSpec, name: str, n_particles: int, threads: int | None
+) -> tuple[dict[str, Any], Gains]:
     """Follow an ensemble that is not stored; return its summary and its gains."""
-    spec = arguments.spec
     with announce_compilation(), progress_bar() as bar:
         found = fast.simulate(
             spec.scene,
-            n_particles=arguments.particles,
+            n_particles=n_particles,
             energy=spec.energy,
             n_cycles=spec.n_cycles,
             seed=spec.seed,
-            threads=arguments.threads,
-            progress=arguments.watch(bar),
+            threads=threads,
+            progress=partial(Watch(bar, name, "particles").update, n_total=n_particles),
         )
     with np.errstate(divide="ignore"):
         gains = np.log(found.cycle_energies[found.takes_part()] / spec.energy)
-    tally = tally_of({**found._asdict(), "takes_part": found.takes_part()})
-    tell(careful_note(tally.careful, tally.collisions, found.seconds))
-    summary = _summary(spec, tally, found.seconds * found.threads, lambda: [gains], found.sha256())
-    return summary, lambda: [gains]
+    seconds = found.seconds * found.threads
+    return _summary(spec, tally_of(found), seconds, lambda: [gains], found.sha256()), lambda: [gains]
 
 
-def _on_disk(arguments: CliArgs, folder: Path, resume: bool) -> tuple[dict[str, Any], Gains]:
-    """Bring the run in a folder to its end, or the command to its own; return its summary and gains."""
-    spec, n = arguments.spec, arguments.particles
-    command = spec.command(arguments.scene, n, folder)
-    default = conduct.block_of_new(spec, n, arguments.n_threads)
-    with named(folder), announce_compilation():
-        run = conduct.open_or_create(folder, spec, n, arguments.block, default, command, resume)
+def _on_disk(
+    run: StoredRun, name: str, complete: Callable[[conduct.OnProgress], None]
+) -> tuple[dict[str, Any], Gains]:
+    """Bring a stored run to its end, or the command to its own; return its summary and gains."""
     n_before = run.tally.particles
     try:
-        with named(folder):
-            _complete(arguments, run)
-            summary = _summary(spec, run.tally, run.seconds, run.gains, run.sha256())
+        with named(run.folder):
+            with announce_compilation(), progress_bar() as bar:
+                complete(partial(Watch(bar, name, "particles").update, n_total=run.shape.n_particles))
+            summary = _summary(run.spec, run.tally, run.seconds, run.gains, run.sha256())
     except conduct.LimitReached as limit:
-        tell(f"{limit}: {_how_to_resume(run, command)}")
+        tell(f"{limit}: {_how_to_resume(run)}")
         if run.tally.particles == n_before:  # it would stop there again and again
             tell(f"{NO_BLOCK} than {run.shape.block}")
         raise typer.Exit(LIMITED) from None
     except (KeyboardInterrupt, OSError) as error:  # of a file, or a connection to a cluster
-        error.add_note(_how_to_resume(run, command))
+        error.add_note(_how_to_resume(run))
         raise
-    data = spec.to_data()
+    data = run.spec.to_data()
     kept = {name: data[name] for name in ("scene", "energy", "cycles", "seed")} | summary
-    write_file(folder / "summary.json", json.dumps(kept) + "\n")
+    write_file(run.folder / "summary.json", json.dumps(kept) + "\n")
     return summary, run.gains
 
 
-def _how_to_resume(run: StoredRun, command: str) -> str:
+def _how_to_resume(run: StoredRun) -> str:
     """Return what is kept of a run that ends early, and which command goes on with it."""
     kept = f"{run.tally.particles:,} of {run.shape.n_particles:,} particles are kept"
     if not run.tally.particles and run.first_there() is not None:  # with fewer cycles or particles
         kept = "what was there is kept"
-    return f"{kept}; go on with: {command}"
-
-
-def _complete(arguments: CliArgs, run: StoredRun) -> None:
-    """Follow what a run lacks."""
-    before, seconds = run.tally, run.seconds
-    engine: conduct.Engine = partial(conduct.in_process, threads=arguments.threads)
-    if arguments.dask:
-        engine = partial(conduct.by_dask, address=arguments.dask, threads=arguments.threads)
-    with announce_compilation(), progress_bar() as bar:
-        conduct.complete(
-            run,
-            engine,
-            arguments.watch(bar),
-            max_collisions=arguments.max_collisions,
-            max_seconds=arguments.max_seconds,
-        )
-    n_careful, n = run.tally.careful - before.careful, run.tally.collisions - before.collisions
-    tell(careful_note(n_careful, n, (run.seconds - seconds) / arguments.n_threads))
+    return f"{kept}; go on with: {run.command}"
 
 
 def _summary(spec: RunSpec, tally: RunTally, seconds: float, gains: Gains, sha256: str) -> dict[str, Any]:

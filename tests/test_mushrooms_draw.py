@@ -93,14 +93,6 @@ def test_a_particle_is_captured_from_the_flight_that_begins_in_the_cap(scene, st
     assert (one.walls[0], one.captured().tolist()) == (wall, [captured, True, True])
 
 
-def test_an_island_keeps_its_angle_and_a_chaotic_orbit_does_not():
-    section = whispering().section()
-    assert section.is_captured().all()
-    assert np.ptp(np.abs(section.sin_phi)) < 1e-10
-    free = next(o for o in orbits.follow(STATIC, N_COLLISIONS, n_orbits=4, seed=1) if not o.captured().any())
-    assert np.ptp(np.abs(free.section().sin_phi)) > 0.3
-
-
 def test_a_wrong_edge_would_be_seen():
     """Were the mouth half as wide, orbits that leave the cap would count as captured."""
     crossed = [0, 0]
@@ -157,14 +149,17 @@ def test_chained_jacobians_are_those_of_the_proved_trajectory():
     )  # the orbit is the proved one but for rounding, stretched
 
 
-def test_a_chaotic_orbit_stretches_and_an_island_does_not():
+def test_a_chaotic_orbit_stretches_and_an_island_keeps_its_angle_and_does_not():
     free = next(o for o in orbits.follow(STATIC, 64, n_orbits=4, seed=1) if not o.captured().any())
+    assert np.ptp(np.abs(free.section().sin_phi)) > 0.3
     found = lyapunov.stretching(free)
     assert found.exponent > 5 * found.error > 0
     assert found.logs.mean() == pytest.approx(found.exponent)
     assert found.exponents[-1] == found.exponent
-    still = lyapunov.stretching(whispering(n=64))
-    assert abs(still.exponent) < 3 * math.log(64) / 64
+    section = whispering().section()
+    assert section.is_captured().all()
+    assert np.ptp(np.abs(section.sin_phi)) < 1e-10
+    assert abs(lyapunov.stretching(whispering(n=64)).exponent) < 3 * math.log(64) / 64
     with pytest.raises(scenes.BadInput, match="collisions = 31, must be >= 32"):
         lyapunov.stretching(whispering(n=31))
 
@@ -321,18 +316,24 @@ KINDS = {"pdf": b"%PDF", "gif": b"GIF89a", "svg": b"<?xml", "png": b"\x89PNG"}
 
 
 OF_A_PATH = ("--trajectory", "--collisions", 20, "--seed", 4)
-CASES = list(itertools.product(KINDS, [(), OF_A_PATH]))
+CASES = [(suffix, "untilted", *kind) for suffix in KINDS for kind in ((), OF_A_PATH)]
+CASES += [("svg", name) for name in scenes.catalogue() if name != "moving-cap-as-printed"]
+NOT_DEEP = ("svg", "untilted", *OF_A_PATH), ("png", "untilted"), ("gif", "untilted"), ("svg", "ergodic")
 
 
-@pytest.mark.parametrize("case", deep_but(CASES, ("svg", OF_A_PATH), ("png", ()), ("gif", ())))
-def test_a_picture_has_the_kind_of_its_ending_and_the_same_bytes_again(command_line, tmp_path, case):
-    suffix, kind = case
-    path = tmp_path / f"path.{suffix}"
-    assert command_line("draw", "untilted", *kind, "--out", path).code == 0
+@pytest.mark.parametrize("case", deep_but(CASES, *NOT_DEEP))
+def test_every_scene_has_a_picture_of_any_kind_and_the_same_bytes_again(
+    command_line, tmp_path, monkeypatch, case
+):
+    suffix, name, *options = case
+    monkeypatch.chdir(tmp_path)
+    path, out = tmp_path / f"{name}.{suffix}", [] if suffix == "svg" else ["--out", f"{name}.{suffix}"]
+    ended = command_line("draw", name, *options, *out)
+    assert (ended.code, ended.out, list(tmp_path.iterdir())) == (0, f"{path.name}\n", [path])
     first = path.read_bytes()
     assert first.startswith(KINDS[suffix])
     if suffix != "gif":  # whose frames take longer
-        command_line("draw", "untilted", *kind, "--out", path)
+        command_line("draw", name, *options, *out)
         assert path.read_bytes() == first
 
 
@@ -450,17 +451,6 @@ def test_clockwise_has_no_bound_in_depth_anticlockwise_none_only_if_the_mouth_cl
     assert shut[3] == pytest.approx(shut[2], rel=1e-2)
 
 
-@pytest.mark.parametrize("clockwise", [False, True])
-def test_the_fastest_loop_is_not_beaten_by_its_neighbours(clockwise):
-    best, rate = fastest(0.02, 0.1, clockwise=clockwise)
-    assert rate == pytest.approx(best.m1 / best.path)
-    assert (best.closing < best.opening) == clockwise
-    for h1, w0 in itertools.product((0.9, 1.0, 1.1), (1.0, 1.2)):
-        depths = [h if h == 0.1 else h * h1 for h in best[:2]]
-        near = Loop(*depths, 0.02 * w0)
-        assert near.m1 / near.path <= rate * (1 + 1e-6)
-
-
 def test_the_moving_cap_is_trivial_in_phase_and_gains_with_the_square_of_the_amplitude():
     found = phase_diagram(np.array([0.0, math.pi / 2, math.pi]), np.array([0.1, 0.2]))
     assert np.abs(found[:, 0]).max() < 1e-12
@@ -483,33 +473,33 @@ def test_the_page_says_what_the_code_finds():
             best, found = fastest(w0, h0, clockwise=clockwise)
             assert (max(best[:2]), best.w0) == (pytest.approx(h1, abs=6e-3), pytest.approx(w0, rel=1e-3))
             assert found == pytest.approx(rate, abs=6e-6)
+            assert found == pytest.approx(best.m1 / best.path)
+            assert (best.closing < best.opening) == clockwise
+            # Neither a shorter nor a longer stroke of h, nor a wider mouth, gains more.
+            for stroke, w in itertools.product((0.9, 1.0, 1.1), (1.0, 1.2)):
+                depths = [h if h == h0 else h * stroke for h in best[:2]]
+                near = Loop(*depths, best.w0 * w)
+                assert near.m1 / near.path <= found * (1 + 1e-6)
 
 
 @pytest.mark.parametrize(
-    ("number", "text"), [(50.0, "50"), (2500.0, "2500"), (1e5, "$10^{5}$"), (2.5e-7, r"$2.5\cdot10^{-7}$")]
-)
-def test_energies_are_written_as_powers(number, text):
-    assert style.power(number) == text
-
-
-@pytest.mark.parametrize(
-    ("text", "html"),
+    ("write", "given", "text"),
     [
-        ("p_nc", "<i>p</i><sub>nc</sub>"),
-        ("E0^(-1/4)", "<i>E</i><sub>0</sub><sup>−1/4</sup>"),
-        ("dV_ell / V_cha", "<i>dV</i><sub>ell</sub> / <i>V</i><sub>cha</sub>"),
-        ("log E1/E0", "log <i>E</i><sub>1</sub>/<i>E</i><sub>0</sub>"),
-        ("sigma_w <= 10^-25", "<i>σ</i><sub>w</sub> ≤ 10<sup>−25</sup>"),
-        ("x^2 + y^2", "x<sup>2</sup> + y<sup>2</sup>"),
-        ("nu(t)", "<i>ν</i>(t)"),
-        ("<script>a_b</script>", "&lt;script&gt;<i>a</i><sub>b</sub>&lt;/script&gt;"),
-        *((prose, prose) for prose in ("M1 and X2, see L7", "theory/equations.md", "sec. 4.1", "numbers")),
-        *((prose, prose) for prose in ("minus 3 sd at n = 30", "moving-cap@1e7")),
+        *((style.power, *row) for row in ((50.0, "50"), (2500.0, "2500"), (1e5, "$10^{5}$"))),
+        (style.power, 2.5e-7, r"$2.5\cdot10^{-7}$"),
+        (as_json, {"notes": "the captions' nu, größer"}, '{"notes": "the captions\' nu, größer"}'),
+        (typeset, "p_nc", "<i>p</i><sub>nc</sub>"),
+        (typeset, "E0^(-1/4)", "<i>E</i><sub>0</sub><sup>−1/4</sup>"),
+        (typeset, "dV_ell / V_cha", "<i>dV</i><sub>ell</sub> / <i>V</i><sub>cha</sub>"),
+        (typeset, "log E1/E0", "log <i>E</i><sub>1</sub>/<i>E</i><sub>0</sub>"),
+        (typeset, "sigma_w <= 10^-25", "<i>σ</i><sub>w</sub> ≤ 10<sup>−25</sup>"),
+        (typeset, "x^2 + y^2", "x<sup>2</sup> + y<sup>2</sup>"),
+        (typeset, "nu(t)", "<i>ν</i>(t)"),
+        (typeset, "<script>a_b</script>", "&lt;script&gt;<i>a</i><sub>b</sub>&lt;/script&gt;"),
+        *((typeset, prose, prose) for prose in ("M1 and X2, see L7", "theory/equations.md", "sec. 4.1")),
+        *((typeset, prose, prose) for prose in ("numbers", "minus 3 sd at n = 30", "moving-cap@1e7")),
     ],
 )
-def test_formulas_are_typeset_prose_is_left_alone_and_markup_escaped(text, html):
-    assert typeset(text) == html
-
-
-def test_scenes_are_written_as_a_reader_sees_them():
-    assert as_json({"notes": "the captions' nu, größer"}) == '{"notes": "the captions\' nu, größer"}'
+def test_numbers_data_and_formulas_are_written_as_a_reader_sees_them(write, given, text):
+    """Prose is left alone, and markup escaped."""
+    assert write(given) == text

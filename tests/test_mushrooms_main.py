@@ -128,11 +128,8 @@ def test_simulate_prints_and_saves_the_same_result(command_line, tmp_path):
         "particles", "collisions", "lost", "undecided", "careful", "collision_time", "m1", "m1_se",
         "m1_theory", "m1_z", "p_nc", "p_nc_se", "p_nc_theory", "p_nc_z", "ns_per_collision", "sha256",
     ]  # fmt: skip
-    names = ["blocks", "ensemble.zarr", "summary.json"]
-    assert sorted(entry.name for entry in (tmp_path / "run").iterdir()) == names
     saved = json.loads((tmp_path / "run" / "summary.json").read_text())
-    assert saved.items() >= summary.items()
-    assert saved["seed"] == 7
+    assert saved.items() >= {**summary, "seed": 7}.items()
     assert scenes.from_data(saved["scene"]) == scenes.load("moving-cap")
     found = fast.simulate(scenes.load("moving-cap"), n_particles=40, energy=1e4, seed=7)
     assert np.log(found.energy / 1e4).mean() == pytest.approx(summary["m1"], rel=1e-12)
@@ -141,18 +138,6 @@ def test_simulate_prints_and_saves_the_same_result(command_line, tmp_path):
     assert command_line(*command, "--threads", 1).data()["sha256"] == summary["sha256"]
     one = command_line("simulate", "breathing-circle", "--particles", 1, "--energy", 50, "--json").data()
     assert (one["m1_se"], one["p_nc"]) == (None, None)  # what one particle in a cap cannot tell
-
-
-DRAWABLE = [name for name in scenes.catalogue() if name != "moving-cap-as-printed"]
-
-
-@pytest.mark.parametrize("name", deep_but(DRAWABLE, "fixed-cap-clockwise"))
-def test_every_scene_can_be_drawn(command_line, tmp_path, monkeypatch, name):
-    monkeypatch.chdir(tmp_path)
-    code, out, _ = command_line("draw", name)
-    assert (code, out) == (0, f"{name}.svg\n")
-    assert "</svg>" in (tmp_path / f"{name}.svg").read_text("utf-8")
-    assert os.listdir(tmp_path) == [f"{name}.svg"]
 
 
 def test_the_version_is_printed(command_line):

@@ -29,7 +29,6 @@ from mushrooms.store import conduct
 from mushrooms.store import run as stored
 from mushrooms.store.run import DESCRIPTION, DIGESTED, StoredRun
 from mushrooms.store.spec import LANES, SCHEMA, RunSpec, paused_of, shape_of
-from mushrooms.store.summary import gain_of
 from scene import load
 
 pytestmark = pytest.mark.usefixtures("unsynced")
@@ -43,8 +42,8 @@ def arguments(folder, *more, n=N, block=64, name="fermi-ulam"):
 
 @pytest.fixture(scope="module")
 def whole():
-    """Return the SHA-256 of a run at once, by its number of particles."""
-    return {n: run_at_once("fermi-ulam", n) for n in (N, 500)}
+    """Return the SHA-256 of a run at once."""
+    return run_at_once("fermi-ulam", N)
 
 
 def run_at_once(name, n, energy=ENERGY, n_cycles=1):
@@ -80,49 +79,62 @@ def break_off(monkeypatch):
     return after
 
 
-@pytest.mark.parametrize(
-    ("name", "energy", "n_cycles"),
-    [
-        pytest.param("fermi-ulam", 40.0, 3, marks=pytest.mark.deep),
-        pytest.param("breathing-circle", 40.0, 2, marks=pytest.mark.deep),
-        ("moving-cap", 60.0, 2),
+PROBED = (0, conduct.PROBED)
+TWO_OF = f"interrupted; 64 of {N} particles are kept; go on with: mushrooms simulate fermi-ulam"
+# Particles and cycles that are asked for; how many blocks are kept before it is broken off, or None; what is
+# followed (first particle, how many, from which cycle to which), or what is said then.
+GOES_ON = {
+    "widened from its last full block": [
+        (N, 1, 2, TWO_OF),
+        (N, 1, None, [(*PROBED, 0, 1), *((k, 32, 0, 1) for k in range(64, 320, 32)), (320, 10, 0, 1)]),
+        (400, 1, None, [(*PROBED, 0, 1), *((k, 32, 0, 1) for k in (320, 352)), (384, 16, 0, 1)]),
     ],
-)
-def test_blocks_of_any_size_have_one_digest(tmp_path, name, energy, n_cycles):
-    """In order and not, with arrays that hold nothing; m1 and its error have one set of bits too."""
-    scene, random = load(name), np.random.default_rng(3)
-    spec, wanted = RunSpec(scene, energy, n_cycles, SEED), run_at_once(name, 150, energy, n_cycles)
-    tallies = set()
-    for block in (7, 150, 1000, *random.integers(2, 150, 3).tolist()):
-        folder = tmp_path / str(block)
-        folder.mkdir()
-        run = StoredRun(folder, spec, shape_of(spec, 150, block), "")
-        block_ranges = list(run.missing())
-        for i in random.permutation(len(block_ranges)).tolist():
-            run.keep(block_ranges[i], conduct.follow(spec, block_ranges[i], 1))
-        assert run.sha256() == wanted
-        tallies.add((run.tally, gain_of(run.gains)))
-    assert len(tallies) == 1
+    "long enough, then lengthened and widened": [
+        (150, 2, None, [(0, 32, 0, 2), *((k, 32, 0, 2) for k in (32, 64, 96)), (128, 22, 0, 2)]),
+        (150, 2, None, [(*PROBED, 0, 2)]),
+        (
+            *(170, 3, None),
+            [
+                *((*PROBED, *cycles) for cycles in ((0, 2), (2, 3), (0, 3))),
+                *((k, 32, 2, 3) for k in range(0, 128, 32)),
+                *((128, 32, 0, 3), (160, 10, 0, 3)),
+            ],
+        ),
+    ],
+    # Also to more cycles than it was broken off at: blocks of three lengths stand side by side.
+    "lengthened, broken off again and again": [
+        (150, 1, None, [(k, min(32, 150 - k), 0, 1) for k in range(0, 150, 32)]),
+        (150, 2, 3, "interrupted; 96 of 150 particles are kept"),
+        (150, 4, 0, "interrupted; what was there is kept; go on with: mushrooms simulate fermi-ulam"),
+        (150, 4, 1, "interrupted; 32 of 150 particles are kept"),
+        (
+            *(150, 4, None),
+            [
+                *((32, 4, *cycles) for cycles in ((0, 2), (2, 4), (0, 4))),  # probes: they can be lengthened
+                *((32, 32, 2, 4), (64, 32, 2, 4), (96, 32, 1, 4), (128, 22, 1, 4)),
+            ],
+        ),
+    ],
+}
 
 
-def test_a_run_goes_on_and_is_widened_from_its_last_full_block(
-    command_line, tmp_path, followed, whole, break_off
-):
-    break_off(2)
-    code, out, err = command_line(*arguments(tmp_path))
-    assert (code, out) == (130, "")
-    assert f"interrupted; 128 of {N} particles are kept; go on with: mushrooms simulate fermi-ulam" in err
-    assert f"--out {tmp_path} --resume" in err
-    followed.clear()
-    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
-    probe = (0, conduct.PROBED, 0, 1)
-    assert followed == [probe, *((first, 64, 0, 1) for first in (128, 192, 256)), (320, 10, 0, 1)]
-    followed.clear()
-    wider = command_line(*arguments(tmp_path, "--resume", n=500, block=None))
-    assert digest_of(wider) == whole[500]
-    assert followed == [probe, (320, 64, 0, 1), (384, 64, 0, 1), (448, 52, 0, 1)]
+@pytest.mark.parametrize("name", GOES_ON)
+def test_a_run_goes_on_with_what_it_lacks(command_line, tmp_path, followed, break_off, name):
+    for n, cycles, n_kept, wanted in GOES_ON[name]:
+        followed.clear()
+        break_off(10**4 if n_kept is None else n_kept)
+        ended = command_line(*arguments(tmp_path, "--cycles", cycles, "--resume", n=n, block=32))
+        if n_kept is None:
+            assert followed == wanted
+            assert digest_of(ended) == run_at_once("fermi-ulam", n, n_cycles=cycles)
+        else:
+            assert (ended.code, ended.out, wanted in ended.err) == (130, "", True)
+            group = zarr.open_group(tmp_path / "ensemble.zarr", mode="r")  # what is missing is nan, or -1
+            assert np.isfinite(group["cycle_energies"][:, -1]).sum() == 32 * n_kept
+            assert (group["outcome"][:] == -1).sum() == (n - 32 * n_kept if cycles == 1 else 0)
+            assert f"--cycles {cycles} --seed {SEED} --out {tmp_path} --resume" in ended.err
     saved = json.loads((tmp_path / "summary.json").read_text())
-    assert saved.items() >= json.loads(wider.out).items()
+    assert saved.items() >= {**ended.data(), "cycles": cycles, "particles": n}.items()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["blocks", "ensemble.zarr", "summary.json"]
 
 
@@ -163,7 +175,7 @@ def test_a_damaged_file_is_mended_and_its_block_followed_again(
         assert not (finished / "run.npz").exists()
     followed.clear()
     again = command_line(*arguments(finished, "--resume"))
-    assert digest_of(again) == whole[N]
+    assert digest_of(again) == whole
     assert ("1 blocks (2)" in again.err) == is_block
     assert followed == [(0, conduct.PROBED, 0, 1), *[(128, 64, 0, 1)] * is_block]
     assert is_block or len(path.read_bytes()) == len(content)
@@ -198,7 +210,7 @@ def test_a_full_disk_leaves_a_run_that_goes_on(command_line, tmp_path, monkeypat
     assert_refused(ended, "No space left on device", "go on with: mushrooms simulate")
     full_disk(monkeypatch, 10**9)
     assert not list(tmp_path.rglob(".*"))
-    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole
 
 
 def test_a_target_that_is_read_only_is_refused(command_line, finished, monkeypatch):
@@ -215,9 +227,9 @@ def test_a_target_that_is_read_only_is_refused(command_line, finished, monkeypat
 def test_one_writer_holds_a_folder(command_line, tmp_path, whole):
     with locked(tmp_path):  # of an open file, not of the process: another one is refused too
         assert_refused(command_line(*arguments(tmp_path)), f"process {os.getpid()} on", "one run at a time")
-    assert digest_of(command_line(*arguments(tmp_path))) == whole[N]
+    assert digest_of(command_line(*arguments(tmp_path))) == whole
     (tmp_path / LOCK).write_text("process 1 on a machine that lost power")  # nobody holds it
-    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole
 
 
 @pytest.mark.parametrize(
@@ -246,18 +258,7 @@ def test_blocks_of_another_run_do_not_count(command_line, tmp_path, followed, wh
     digest_of(command_line(*arguments(tmp_path / "other", "--seed", 8)))
     (tmp_path / "other" / "ensemble.zarr" / "zarr.json").unlink()
     (tmp_path / "other" / "blocks" / DESCRIPTION).unlink()
-    assert digest_of(command_line(*arguments(tmp_path / "other"))) == whole[N]
-
-
-def test_a_machine_with_other_numbers_does_not_go_on(command_line, finished, monkeypatch):
-    go_on = fast.go_on
-
-    def other(scene, **options):
-        run = go_on(scene, **options)
-        return run._replace(ensemble=run.ensemble._replace(x=np.nextafter(run.ensemble.x, 1.0)))
-
-    monkeypatch.setattr(fast, "go_on", other)
-    assert_refused(command_line(*arguments(finished, "--resume", n=500)), "x of its first particles", "numba")
+    assert digest_of(command_line(*arguments(tmp_path / "other"))) == whole
 
 
 def test_limits_end_in_a_run_that_goes_on(command_line, tmp_path, monkeypatch, whole):
@@ -272,7 +273,7 @@ def test_limits_end_in_a_run_that_goes_on(command_line, tmp_path, monkeypatch, w
     assert 0 < int(err.split("passed: ")[1].split(" of")[0]) < N
     assert "no block" not in err
     done = command_line(*arguments(tmp_path, "--resume", "--max-collisions", 10**6))
-    assert digest_of(done) == whole[N]
+    assert digest_of(done) == whole
 
 
 def test_blocks_take_seconds_and_fit_into_memory():
@@ -288,8 +289,8 @@ def test_the_time_of_day_decides_nothing(command_line, tmp_path, monkeypatch, wh
     """It jumps back and forth."""
     jumps = np.random.default_rng(1).uniform(0, 4e9, 10**5).tolist()
     monkeypatch.setattr(time, "time", jumps.pop)
-    assert digest_of(command_line(*arguments(tmp_path, "--max-seconds", 1e6))) == whole[N]
-    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+    assert digest_of(command_line(*arguments(tmp_path, "--max-seconds", 1e6))) == whole
+    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole
 
 
 def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, tmp_path, break_off):
@@ -342,7 +343,7 @@ def test_faulty_stores_are_found_out(command_line, tmp_path, monkeypatch, whole,
     path = tmp_path / "ensemble.zarr" / "t" / "c" / "2"
     path.write_bytes(flipped(path.read_bytes()))
     ended = command_line(*arguments(tmp_path, "--resume"))
-    assert ended.code != 0 or json.loads(ended.out)["sha256"] != whole[N]
+    assert ended.code != 0 or json.loads(ended.out)["sha256"] != whole
 
 
 N_LONG, BLOCK = 150, 32
@@ -386,42 +387,6 @@ def test_a_run_is_lengthened_and_widened_to_the_bits_of_one_at_once(command_line
     assert run.takes_part.values.tolist() == wanted.takes_part().tolist()
 
 
-def test_a_run_that_is_long_enough_is_not_followed_again(command_line, tmp_path, followed):
-    summary_of(command_line(*lengthened(tmp_path, 2)))
-    followed.clear()
-    assert summary_of(command_line(*lengthened(tmp_path, 2)))["sha256"] == cycles_at_once(2).sha256()
-    assert followed == [(0, 4, 0, 2)]
-    followed.clear()
-    summary_of(command_line(*lengthened(tmp_path, 3, n=170)))
-    probes = [(0, 4, 0, 2), (0, 4, 2, 3), (0, 4, 0, 3)]
-    whole = [(first, 32, 2, 3) for first in range(0, 128, 32)]
-    assert followed == [*probes, *whole, (128, 32, 0, 3), (160, 10, 0, 3)]
-    saved = json.loads((tmp_path / "summary.json").read_text())
-    assert (saved["cycles"], saved["particles"]) == (3, 170)
-
-
-def test_a_lengthening_that_is_broken_off_goes_on(command_line, tmp_path, followed, break_off):
-    """Also to more cycles than it was broken off at; blocks of three lengths stand side by side."""
-    summary_of(command_line(*lengthened(tmp_path, 1)))
-    for cycles, n_kept in ((2, 3), (4, 0), (4, 1)):
-        break_off(n_kept)
-        code, out, err = command_line(*lengthened(tmp_path, cycles))
-        assert (code, out) == (130, "")
-        told = f"{32 * n_kept} of {N_LONG} particles are" if n_kept else "what was there is"
-        assert f"interrupted; {told} kept; go on with: mushrooms simulate fermi-ulam" in err
-        assert f"--cycles {cycles}" in err
-    assert_refused(
-        command_line("export", tmp_path, "--to", tmp_path / "a.csv"), f"has 32 of {N_LONG} particles"
-    )
-    assert_refused(command_line(*lengthened(tmp_path, 3)), "cycles = 4 there, 3 asked for: a run only grows")
-    followed.clear()
-    assert digest_of(command_line(*lengthened(tmp_path, 4))) == cycles_at_once(4).sha256()
-    assert followed == [
-        *((32, 4, 0, 2), (32, 4, 2, 4), (32, 4, 0, 4)),  # the probes: they can be lengthened
-        *((32, 32, 2, 4), (64, 32, 2, 4), (96, 32, 1, 4), (128, 22, 1, 4)),
-    ]
-
-
 @pytest.mark.parametrize("n_written", [0, 1, 5, 100])
 def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
     command_line, tmp_path, followed, monkeypatch, n_written
@@ -452,18 +417,24 @@ def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
     assert ("1 blocks (0)" in ended.err) == (n_written > 3)
 
 
-def test_a_chunk_holds_the_cycles_that_a_run_began_with(command_line, tmp_path):
+def test_a_chunk_holds_the_cycles_that_a_run_began_with_and_is_written_once(command_line, tmp_path):
+    folder, written = tmp_path / "ensemble.zarr" / "cycle_energies" / "c" / "1", set()
     for cycles in (2, 5):
         summary_of(command_line(*lengthened(tmp_path, cycles)))
         energy = zarr.open_group(tmp_path / "ensemble.zarr", mode="r")["cycle_energies"]
         assert (energy.shape, energy.chunks) == ((N_LONG, cycles), (BLOCK, 2))
-    folder = tmp_path / "ensemble.zarr" / "cycle_energies" / "c" / "1"
+        written.add((folder / "0").stat().st_mtime_ns)
     assert sorted(path.name for path in folder.iterdir()) == ["0", "1", "2"]
+    assert len(written) == 1
 
 
-def test_what_is_kept_takes_the_room_that_the_page_says():
-    shape = shape_of(RunSpec(load("moving-cap"), ENERGY, 1, SEED), 1, 1)
-    assert shape.bytes_of_a_particle == 114 + 8 * kernel.LANE_ROWS == 410
+go_on = fast.go_on
+
+
+def with_other_numbers(scene, **options):
+    """Follow as a machine does whose numbers differ in their last place."""
+    run = go_on(scene, **options)
+    return run._replace(ensemble=run.ensemble._replace(x=np.nextafter(run.ensemble.x, 1.0)))
 
 
 def forgotten(row):
@@ -481,13 +452,23 @@ def of_others(arrays, *more):
     return paused_of({**arrays, LANES: arrays[LANES][::-1]}, *more)
 
 
-@pytest.mark.parametrize("faulty", [forgotten(records.VX), forgotten(records.PHASE_SINE), of_others])
-def test_a_run_that_would_go_on_otherwise_does_not(command_line, tmp_path, monkeypatch, faulty):
+@pytest.mark.parametrize(
+    ("owner", "name", "faulty"),
+    [
+        (fast, "go_on", with_other_numbers),
+        *(
+            (stored, "paused_of", faulty)
+            for faulty in (forgotten(records.VX), forgotten(records.PHASE_SINE), of_others)
+        ),
+    ],
+)
+def test_a_run_that_would_go_on_otherwise_does_not(command_line, tmp_path, monkeypatch, owner, name, faulty):
     """The first particles are followed both ways before a block is touched."""
     summary_of(command_line(*lengthened(tmp_path, 1)))
     before = held(tmp_path)
-    monkeypatch.setattr(conduct, "paused_of", faulty)
-    assert_refused(command_line(*lengthened(tmp_path, 2)), "of its first particles comes out otherwise here")
+    monkeypatch.setattr(owner, name, faulty)
+    refused = command_line(*lengthened(tmp_path, 2))
+    assert_refused(refused, "of its first particles comes out otherwise here", "numba")
     assert held(tmp_path) == before
 
 

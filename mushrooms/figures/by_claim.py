@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,7 +33,7 @@ from conformance.audit.claims.finite_energy import ACW, CW, ERGODIC, LADDER, fit
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import Mean, mean, share
-from mushrooms.figures.energies import draw, draw_adiabatic, gathered, panels
+from mushrooms.figures.energies import draw, draw_adiabatic, gathered, with_residuals
 from mushrooms.figures.orbits import draw_map, draw_section
 from mushrooms.figures.style import (
     BLACK,
@@ -52,24 +53,23 @@ from scene import load
 from scene.laws import values
 from scene.tables import Mushroom, laws
 
+Panels = Any  # axes as `new_figure` returns them
 N_SUM_BINS = 300
 N_LOOP = 240
 N_PHASES = 6
 
 
-def loops() -> Figure:
+def loops(panels: Panels) -> None:
     """Draw the cycles: in the plane (w, h) of sec. 4.1 and the plane (V_ell/V_cap, V_cap/V) of sec. 3.5."""
-    figure, axes = new_figure(9.6, 3.4, 1, 3)
     fixed, moving = load("fixed-cap-anticlockwise"), load("moving-cap")
     w, h = (values(laws(fixed)[name], np.linspace(0, 1, N_LOOP + 1)) for name in "wh")
-    _loop(axes[0], w, h)
-    axes[0].set(xlabel="half-width w", ylabel="depth h", title="fixed cap, anticlockwise")
+    _loop(panels[0], w, h)
+    panels[0].set(xlabel="half-width w", ylabel="depth h", title="fixed cap, anticlockwise")
     titles = ("fixed cap, anticlockwise", "moving cap")
-    for panel, scene, title in zip(axes[1:], (fixed, moving), titles, strict=True):
+    for panel, scene, title in zip(panels[1:], (fixed, moving), titles, strict=True):
         _loop(panel, *(np.array([*values, values[0]]) for values in volume_loop(scene, N_LOOP)))
         panel.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=title)
-    axes[2].legend(loc="best", title="t / T")
-    return figure
+    panels[2].legend(loc="best", title="t / T")
 
 
 def _loop(axes: Axes, x: FloatArray, y: FloatArray) -> None:
@@ -98,9 +98,9 @@ def _points(axes: Axes, x: Sequence[float] | FloatArray, values: Sequence[Mean],
     axes.errorbar(x, found, errors, capsize=2, **usual | {"color": BLUE} | style)
 
 
-def retraced(sample: Sample) -> Figure:
+def retraced(panels: Panels, sample: Sample) -> None:
     """Draw the retraced arc in the plane of sec. 3.5, captures joined to their releases, and its energies."""
-    figure, (left, right) = new_figure(9.6, 3.6, 1, 2)
+    left, right = panels
     scene = scene_of(sample.run)
     assert isinstance(scene, Mushroom)
     left.plot(*volume_loop(scene, N_LOOP), color=BLACK, linewidth=1.2)
@@ -115,7 +115,6 @@ def retraced(sample: Sample) -> Figure:
     left.legend(loc="best")
     _energies(right, None, sample)
     right.legend(loc="upper right", fontsize=7)
-    return figure
 
 
 def _places(scene: Mushroom, times: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -124,9 +123,8 @@ def _places(scene: Mushroom, times: FloatArray) -> tuple[FloatArray, FloatArray]
     return now.v_ell / now.v_cap, now.v_cap / (now.v_cap + now.v_stem)
 
 
-def gain_of_capture() -> Figure:
+def gain_of_capture(axes: Axes) -> None:
     """Draw log E1/E0 against the time of capture, theory (the paper's figure beside its loop)."""
-    figure, axes = new_figure(5.2, 3.2)
     curve = theory.capture_curve(load("moving-cap"), 600)
     best = theory.largest_gain(load("moving-cap"))
     assert best is not None
@@ -136,18 +134,15 @@ def gain_of_capture() -> Figure:
     axes.axhline(free, color=BLACK, linestyle=":", linewidth=1, label=f"never captured: {free:.6f}")
     axes.set(xlabel="time of capture, t_in", ylabel="ln(E1/E0), theory")
     axes.legend()
-    return figure
 
 
-def energies(*samples: Sample) -> Figure:
+def energies(panels: Panels, *samples: Sample) -> None:
     """Draw histograms of log E1/E0 with theory over them, and below what is left, in standard errors."""
-    figure, pairs = panels(len(samples))
-    for (panel, rest), sample in zip(pairs, samples, strict=True):
+    for (panel, rest), sample in zip(panels, samples, strict=True):
         _energies(panel, rest, sample)
         # Below: within the panel it would cover the caustic or a peak, wherever a scene has them.
         entries = panel.get_legend_handles_labels()
         rest.legend(*entries, loc="upper center", bbox_to_anchor=(0.5, -0.5))
-    return figure
 
 
 def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
@@ -158,10 +153,9 @@ def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
     draw_adiabatic(axes, energies_of(sample.run.name), bars.edges, "sharp")
 
 
-def capture_times(*samples: Sample) -> Figure:
+def capture_times(panels: Panels, *samples: Sample) -> None:
     """Draw histograms of capture times with the theory's density over them."""
-    figure, axes = new_figure(9.6, 3.2, 1, len(samples))
-    for panel, sample in zip(np.atleast_1d(axes), samples, strict=True):
+    for panel, sample in zip(panels, samples, strict=True):
         scene = scene_of(sample.run)
         curve = theory.capture_curve(scene, 3)
         edges = np.linspace(curve.t_in[0], curve.t_in[-1], 51)
@@ -169,18 +163,15 @@ def capture_times(*samples: Sample) -> Figure:
         _bars(panel, sample.first_capture[0], edges, sample.n)
         panel.stairs(mass, edges, color=ORANGE, linewidth=1.5, label="theory, eq. (ps)", baseline=None)
         panel.set(xlabel="time of capture", ylabel="density", title=sample.run.name, ylim=(0, None))
-    np.atleast_1d(axes)[0].legend(loc="upper left", fontsize=7)
-    return figure
+    panels[0].legend(loc="upper left", fontsize=7)
 
 
-def sums(*samples: Sample) -> Figure:
+def sums(panels: Panels, *samples: Sample) -> None:
     """Draw log E_n/E0 over n of the last run there is: density, and its tails on a logarithmic axis."""
-    figure, axes = new_figure(9.6, 6.4, 2, 2)
-    for row, n in zip(axes, (10, 30), strict=True):
+    for row, n in zip(panels, (10, 30), strict=True):
         for panel, scale in zip(row, ("linear", "log"), strict=True):
             _sum(panel, samples[-1], n, scale)
         row[0].legend(loc="upper left")
-    return figure
 
 
 def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
@@ -203,9 +194,8 @@ def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
     )
 
 
-def losses(sample: Sample) -> Figure:
+def losses(axes: Axes, sample: Sample) -> None:
     """Draw the share with less energy than at first against the number of cycles."""
-    figure, axes = new_figure(5.6, 3.6)
     scene, n_cycles = scene_of(sample.run), sample.run.n_cycles
     found = predicted(sample).draw(n_cycles, N_DRAWN // n_cycles, DRAWN_SEED)
     axes.plot(
@@ -229,24 +219,21 @@ def losses(sample: Sample) -> Figure:
         title=f"{sample.run.name}, {sample.n:,} particles",
     )
     axes.legend(fontsize=8)
-    return figure
 
 
-def stems(tilted: Sample, upright: Sample) -> Figure:
+def stems(panels: Panels, tilted: Sample, upright: Sample) -> None:
     """Draw the uncaptured particles' energies of both stems, each from its own theory's."""
-    figure, axes = new_figure(9.6, 3.4, 1, 2)
     edges, sigma = np.linspace(-0.4, 0.8, 121), width(tilted).value
     outline: dict[str, Any] = {"color": BLUE, "fill": False, "linewidth": 1.5}
-    for panel, scale in zip(axes, ("linear", "log"), strict=True):
+    for panel, scale in zip(panels, ("linear", "log"), strict=True):
         for sample, label, style in ((tilted, "tilted stem", {}), (upright, "upright stem", outline)):
             kept = sample.gain[~sample.captured] - float(adiabatic_limit(sample.run).log_e_nc)
             _bars(panel, kept, edges, baseline=1e-3, label=label, **style)
         gaussian = norm.pdf(edges, sigma**2 / 4, sigma)
         panel.plot(edges, gaussian, color=GREEN, linewidth=1.2, label="Gaussian, tilted stem's width")
         panel.set(xlabel="ln(E1/E0) of the never captured, from theory's", ylabel="density", yscale=scale)
-    axes[1].set(ylim=(1e-3, 10))
-    axes[0].legend()
-    return figure
+    panels[1].set(ylim=(1e-3, 10))
+    panels[0].legend()
 
 
 N_ORBITS = 40
@@ -254,10 +241,9 @@ N_HITS = 250
 SEED = 7
 
 
-def zone(*samples: Sample) -> Figure:
+def zone(panels: Panels, *samples: Sample) -> None:
     """Draw mean log E of the uncaptured and the share in the chaotic zone through the cycle."""
-    figure, axes = new_figure(9.6, 3.0 * len(samples), len(samples), 2)
-    for (left, right), sample in zip(np.reshape(axes, (-1, 2)), samples, strict=True):
+    for (left, right), sample in zip(panels, samples, strict=True):
         times, means, _ = zone_energy(sample)
         span = times[0] / sample.run.phases[0]
         fine = np.linspace(0, span, 400)
@@ -272,12 +258,10 @@ def zone(*samples: Sample) -> Figure:
         right.set(xlabel="t / T", ylabel="share in the chaotic zone", title=sample.run.name, ylim=(0, 1.05))
         left.legend(loc="lower center")
         right.legend(loc="lower left")
-    return figure
 
 
-def widths(*samples: Sample) -> Figure:
+def widths(axes: Axes, *samples: Sample) -> None:
     """Draw the width of the uncaptured peak against E0, with fitted powers: moving caps, then c = 0."""
-    figure, axes = new_figure(5.4, 3.8)
     moving, ergodic = list(samples[: len(PEAKS)]), list(samples[len(PEAKS) :])
     for these, colour, marker, label in ((moving, BLUE, "o", "moving cap"), (ergodic, GREEN, "s", "c = 0")):
         energies, values = [sample.run.energy for sample in these], [width(sample) for sample in these]
@@ -290,12 +274,10 @@ def widths(*samples: Sample) -> Figure:
     axes.plot(x, printed, color=ORANGE, linestyle="--", label="as printed, E0^(1/4)")
     axes.set(xscale="log", yscale="log", xlabel="E0", ylabel="width of the uncaptured peak of ln(E1/E0)")
     axes.legend(fontsize=8)
-    return figure
 
 
-def convergence(*samples: Sample) -> Figure:
+def convergence(panels: Panels, *samples: Sample) -> None:
     """Draw the mean of s, p_nc and the unbiased mean against E0."""
-    figure, axes = new_figure(9.6, 3.2, 1, 3)
     energies = [sample.run.energy for sample in samples]
     scene = load("moving-cap")
     prediction, unbiased = theory.predict(scene, 15), theory.unbiased_mean(scene)
@@ -304,58 +286,53 @@ def convergence(*samples: Sample) -> Figure:
         ("share never captured", [share(s.never_captured) for s in samples], float(prediction.p_nc)),
         ("mean of exp(-s/2)", [mean(np.exp(-s.gain / 2)) for s in samples], float(unbiased)),
     )
-    for panel, (label, measured, truth) in zip(axes, rows, strict=True):
+    for panel, (label, measured, truth) in zip(panels, rows, strict=True):
         _points(panel, energies, measured)
         panel.axhline(truth, color=ORANGE, label="theory, infinite E0")
         panel.set(xscale="log", xlabel="E0", title=label)
     fit = theory.extrapolate(energies, [v.value for v in rows[0][1]], [v.error for v in rows[0][1]])
     x = np.geomspace(energies[0], energies[-1], 200)
-    axes[0].plot(
+    panels[0].plot(
         x,
         fit.limit + fit.slope * x**-0.5,
         color=BLACK,
         linewidth=1,
         label=f"{fit.limit:.4f} + {fit.slope:.2f} E0^(-1/2)",
     )
-    axes[0].legend(fontsize=8)
-    return figure
+    panels[0].legend(fontsize=8)
 
 
-def release(*samples: Sample) -> Figure:
+def release(panels: Panels, *samples: Sample) -> None:
     """Draw nu(t_out) - nu(t_in) against 1/v."""
-    figure, axes = new_figure(9.6, 3.4, 1, 2)
     for sample in samples:
         shown = np.abs(nu_gap(sample)[:400])
         place = np.full(len(shown), 1 / sample.speed)
-        axes[0].plot(place, shown, ".", color=GREY, markersize=1.5, rasterized=True)
+        panels[0].plot(place, shown, ".", color=GREY, markersize=1.5, rasterized=True)
     x = np.array([1 / sample.speed for sample in samples])
     rms = np.array([math.sqrt(np.mean(nu_gap(sample) ** 2)) for sample in samples])
-    axes[0].plot(x, rms, "o", color=BLUE, label="root mean square")
-    axes[0].plot(x, rms[0] * x / x[0], color=ORANGE, label="slope 1")
-    axes[0].set(
+    panels[0].plot(x, rms, "o", color=BLUE, label="root mean square")
+    panels[0].plot(x, rms[0] * x / x[0], color=ORANGE, label="slope 1")
+    panels[0].set(
         xscale="log",
         yscale="log",
         ylim=(rms.min() / 100, rms.max() * 100),
         xlabel="1/v",
         ylabel="|nu(t_out) - nu(t_in)|",
     )
-    axes[0].legend()
+    panels[0].legend()
     sample = samples[-1]
     gap = nu_gap(sample) * sample.speed
-    axes[1].hist(gap, np.linspace(-1, 1.5, 101), density=True, color=BLUE, alpha=0.5)
-    axes[1].set(xlabel="v (nu(t_out) - nu(t_in))", ylabel="density", title=sample.run.name)
-    return figure
+    panels[1].hist(gap, np.linspace(-1, 1.5, 101), density=True, color=BLUE, alpha=0.5)
+    panels[1].set(xlabel="v (nu(t_out) - nu(t_in))", ylabel="density", title=sample.run.name)
 
 
-def frozen() -> Figure:
+def frozen(panels: Panels) -> None:
     """Draw the frozen mushroom: hits of the arc, and the boundary map."""
-    figure, axes = new_figure(9.6, 4.2, 1, 2)
     found = follow(load("frozen-mushroom"), N_HITS, seed=SEED, n_orbits=N_ORBITS)
-    draw_section(axes[0], found)
-    draw_map(axes[1], found)
-    for panel in axes:
+    draw_section(panels[0], found)
+    draw_map(panels[1], found)
+    for panel in panels:
         panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15))
-    return figure
 
 
 Samples = Mapping[str, Sample]
@@ -369,14 +346,16 @@ class Picture(NamedTuple):
     Attributes:
         claim: the claims's id below which it stands.
         caption: what it shows.
-        draw: makes it from the samples of its runs.
+        draw: draws into its panels the samples of its runs.
+        panels: returns a new figure and its panels.
         needs: runs it cannot do without.
         more: runs that it shows where they are there, after the others.
     """
 
     claim: str
     caption: str
-    draw: Callable[..., Figure]
+    draw: Callable[..., None]
+    panels: Callable[[], tuple[Figure, Panels]]
     needs: tuple[str, ...] = ()
     more: tuple[str, ...] = ()
 
@@ -388,17 +367,20 @@ ALL = (
         "(cycle). Middle and right: the plane of sec. 3.5, in which energy grows when the loop bounds"
         " an area (M12). The moving cap's runs clockwise, as its caption in the paper says.",
         loops,
+        partial(new_figure, 9.6, 3.4, 1, 3),
     ),
     Picture(
         "N5",
         "Theory: what a particle captured at t_in has gained after the cycle.",
         gain_of_capture,
+        partial(new_figure, 5.2, 3.2),
     ),
     Picture(
         "M7",
         "Width of the uncaptured peak against energy, with fitted powers, and the power as printed. "
         "Error bars are smaller than the marks.",
         widths,
+        partial(new_figure, 5.4, 3.8),
         (*PEAKS, *ERGODIC[1:]),
     ),
     Picture(
@@ -406,6 +388,7 @@ ALL = (
         "How the moving cap's means approach the theory as E0 grows. The mean of exp(-s/2), right, "
         "has no bias of order E0^(-1/2).",
         convergence,
+        partial(new_figure, 9.6, 3.2, 1, 3),
         LADDER[:6],
         LADDER[6:],
     ),
@@ -415,6 +398,7 @@ ALL = (
         " dashed; black: the theory at this energy, with diffusion and lags from frozen tables and nothing "
         "fitted.",
         energies,
+        partial(with_residuals, 2),
         (ACW, CW),
     ),
     Picture(
@@ -422,12 +406,14 @@ ALL = (
         "Energies after one cycle, moving cap; as above. The orange density is infinite at its right "
         "end, the caustic of N5.",
         energies,
+        partial(with_residuals, 2),
         ("moving-cap@1e6", MAIN_RUN),
     ),
     Picture(
         "X3",
         "When particles are captured. The area is the captured share.",
         capture_times,
+        partial(new_figure, 9.6, 3.2, 1, 3),
         (MAIN_RUN, ACW, CW),
     ),
     Picture(
@@ -435,15 +421,17 @@ ALL = (
         "Many cycles: the centre and, on a logarithmic axis, the tails, with sums drawn from the theory at "
         "this energy.",
         sums,
+        partial(new_figure, 9.6, 6.4, 2, 2),
         (MANY_SLOWER,),
         (MANY_CYCLES,),
     ),
-    Picture("X5", "c = 0: one narrow peak.", energies, ("ergodic@1e7",)),
+    Picture("X5", "c = 0: one narrow peak.", energies, partial(with_residuals, 1), ("ergodic@1e7",)),
     Picture(
         "X6",
         "Tilted and upright stem: energies of the never captured, each counted from its own theory's "
         "log E_nc. Parabolic orbits between the upright sides spread them far.",
         stems,
+        partial(new_figure, 9.6, 3.4, 1, 2),
         ("moving-cap@1e6", "untilted@1e6"),
     ),
     Picture(
@@ -452,24 +440,28 @@ ALL = (
         "captures (blue) and their releases (orange), at the same V_ell/V_cap, lie at different V_cap/V. "
         "Right: energies after one cycle, as in X1.",
         retraced,
+        partial(new_figure, 9.6, 3.6, 1, 2),
         ("retraced-arc@1e6",),
     ),
     Picture(
         "D1",
         "How rare it is to end with less energy: the probability falls as exp(-n I).",
         losses,
+        partial(new_figure, 5.6, 3.6),
         (MANY_SLOWER,),
     ),
     Picture(
         "L3",
         "The frozen mushroom: orbits in the island (blue) and in the chaotic zone (orange).",
         frozen,
+        partial(new_figure, 9.6, 4.2, 1, 2),
     ),
     Picture(
         "L4",
         "Release: how far nu at release is from nu at capture, against 1/v (grey: single particles), "
         "and its distribution in units of 1/v.",
         release,
+        partial(new_figure, 9.6, 3.4, 1, 2),
         LADDER[1:6],
     ),
     Picture(
@@ -477,17 +469,21 @@ ALL = (
         "Through the cycle: mean log E of the particles not captured so far, and the share of "
         "particles in the chaotic zone (L6).",
         zone,
+        partial(new_figure, 9.6, 6.0, 2, 2),
         (MAIN_RUN, ACW),
     ),
 )
 
 
-def drawn(claims: list[str], samples: Samples) -> list[tuple[Picture, Figure]]:
-    """Draw the figures of these claims whose simulations are there."""
-    found = []
-    for picture in ALL:
-        if picture.claim in claims and all(name in samples for name in picture.needs):
-            runs = [samples[name] for name in (*picture.needs, *picture.more) if name in samples]
-            with rc_context(STYLE):
-                found.append((picture, picture.draw(*runs)))
-    return found
+FIRST = Picture("", "", energies, partial(with_residuals, 1), (MAIN_RUN,))  # on the first screen
+
+
+def draw_picture(picture: Picture, samples: Samples) -> Figure | None:
+    """Draw one figure; None if simulations that it needs are not there."""
+    if not all(name in samples for name in picture.needs):
+        return None
+    runs = [samples[name] for name in (*picture.needs, *picture.more) if name in samples]
+    with rc_context(STYLE):
+        figure, panels = picture.panels()
+        picture.draw(panels, *runs)
+    return figure

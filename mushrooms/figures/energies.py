@@ -102,12 +102,10 @@ def _edges(gain: FloatArray, margin: float) -> FloatArray:
     return np.linspace(low - room, high + room, (N_BARS if len(gain) >= MANY else N_BARS // 2) + 1)
 
 
-def panels(n: int) -> tuple[Figure, list[tuple[Axes, Axes]]]:
-    """Return a figure of n histograms side by side, each with a panel for residuals below it."""
-    figure, _ = new_figure(4.8 * n, 4.8)
-    figure.clear()
-    grid = figure.subplots(2, n, height_ratios=[3, 1], sharex="col", squeeze=False)
-    return figure, [(above, below) for above, below in grid.T]
+def with_residuals(n: int) -> tuple[Figure, Any]:
+    """Return a figure of n histograms side by side, and the panels (n, 2): below each that of residuals."""
+    figure, grid = new_figure(4.8 * n, 4.8, 2, n, height_ratios=[3, 1], sharex="col", squeeze=False)
+    return figure, grid.T
 
 
 @rc_context(STYLE)
@@ -130,7 +128,7 @@ def histogram(scene: Scene, energy: float, gains: Gains, n_particles: int | None
         figure, axes = new_figure(5.2, 4.2)
         draw_limit(axes, scene, bars)
     else:
-        figure, [(axes, rest)] = panels(1)
+        figure, [(axes, rest)] = with_residuals(1)
         draw(axes, rest, bars, found)
         draw_never_captured(axes, float(found.peak[0]))
     axes.set_title(_title(scene, energy, bars, n_particles))

@@ -63,11 +63,13 @@ def power(number: float) -> str:
     return rf"${factor}10^{{{int(exponent)}}}$"
 
 
-def new_figure(width: float, height: float, n_rows: int = 1, n_columns: int = 1) -> tuple[Figure, Any]:
-    """Return a figure [inches] and its axes (an array when there are several)."""
+def new_figure(
+    width: float, height: float, n_rows: int = 1, n_columns: int = 1, **options: Any
+) -> tuple[Figure, Any]:
+    """Return a figure [inches] and its axes (an array when there are several), as `Figure.subplots` does."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
-    return figure, figure.subplots(n_rows, n_columns)
+    return figure, figure.subplots(n_rows, n_columns, **options)
 
 
 @contextmanager

@@ -13,7 +13,6 @@ from typing import Any
 
 import numba
 import numpy as np
-from matplotlib import rc_context
 
 import scene as scenes
 from conformance.audit.claim import Check, Claim, Finding
@@ -154,11 +153,15 @@ def to_json(data: Data) -> str:
 
 def to_html(data: Data, samples: by_claim.Samples) -> str:
     """Return report.html's text: no scripts, images embedded, nothing loaded from elsewhere."""
+    claims = {finding["id"] for finding in data["findings"]}
     figures: dict[str, list[dict[str, str]]] = {}
-    for picture, figure in by_claim.drawn([finding["id"] for finding in data["findings"]], samples):
-        wide = f"{figure.get_figwidth() * PIXELS_PER_INCH:.0f}px"
-        image = {"source": embed(plots.svg(figure)), "caption": picture.caption, "width": wide}
-        figures.setdefault(picture.claim, []).append(image)
+    for picture in by_claim.ALL:
+        figure = by_claim.draw_picture(picture, samples) if picture.claim in claims else None
+        if figure is not None:
+            wide = f"{figure.get_figwidth() * PIXELS_PER_INCH:.0f}px"
+            image = {"source": embed(plots.svg(figure)), "caption": picture.caption, "width": wide}
+            figures.setdefault(picture.claim, []).append(image)
+    first = by_claim.draw_picture(by_claim.FIRST, samples)
     groups = [
         (title, sorted((f for f in data["findings"] if f["id"][0] in letters), key=_place))
         for title, letters in GROUPS.items()
@@ -167,7 +170,7 @@ def to_html(data: Data, samples: by_claim.Samples) -> str:
         "audit.html.jinja",
         report=data,
         headline=headline(samples),
-        first=_first_figure(samples),
+        first=embed(plots.svg(first)) if first else "",
         groups=groups,
         images=figures,
         scenes={run["name"].partition("@")[0]: run["scene"] for run in data["runs"]},
@@ -208,14 +211,6 @@ def headline(samples: by_claim.Samples) -> list[Data]:
             }
         )
     return rows
-
-
-def _first_figure(samples: by_claim.Samples) -> str:
-    """Return the histogram of the moving cap at the paper's energy; empty where it was not simulated."""
-    if by_claim.MAIN_RUN not in samples:
-        return ""
-    with rc_context(plots.STYLE):
-        return embed(plots.svg(by_claim.energies(samples[by_claim.MAIN_RUN])))
 
 
 def _place(finding: Data) -> tuple[list[int], str, int]:
@@ -281,11 +276,9 @@ def to_text(data: Data) -> str:
 
 
 def _failed(finding: Data) -> list[str]:
-    def is_wrong(check: Data) -> bool:
-        return bool((check["holds"] is not True) != (check["form"] == "printed"))
-
+    """Return a line for each check that does not come out as its form asks: what is printed must fail."""
     return [
         f"{check['form']}: {check['what']}: {figures_text(check)}, expected {check['expected']}"
         for check in finding["checks"]
-        if is_wrong(check)
+        if (check["holds"] is not True) != (check["form"] == "printed")
     ]

@@ -25,14 +25,15 @@ import numpy as np
 
 import fast
 import mushrooms
-from mushrooms.store.run import Block, BlockRange, StoredRun, attributes_of, is_run
-from mushrooms.store.spec import Arrays, RunSpec, columns, difference, made_by, paused_of, shape_of
+from fast import Paused
+from mushrooms.store.run import BlockRange, StoredRun, attributes_of, is_run
+from mushrooms.store.spec import RunSpec, columns, difference, made_by, shape_of
 from mushrooms.store.summary import expected_collisions
 from scene import BadInput
 
 # Receives the number of finished particles of the block in progress; its exceptions end the engine.
 OnProgress = Callable[[int], None]
-Following = Generator[tuple[BlockRange, Block], None, None]
+Following = Generator[tuple[BlockRange, Paused], None, None]
 Engine = Callable[[RunSpec, Iterator[BlockRange], OnProgress], Following]
 RETRIES = 10  # of a block whose workers fail or die
 BLOCKS_AHEAD = 2  # waiting for each thread of the cluster: no worker idles, and few blocks are in memory
@@ -42,16 +43,13 @@ POLL_INTERVAL = 0.5  # seconds after which limits are looked at while no block c
 
 def follow(
     spec: RunSpec, block_range: BlockRange, threads: int | None, on_progress: OnProgress | None = None
-) -> Block:
+) -> Paused:
     """Follow the particles of a block, from their starts or from where they were.
 
     Raises:
         BadInput: as `fast.go_on`.
     """
-    before = None
-    if block_range.before is not None:
-        before = paused_of(block_range.before.arrays, spec.energy, block_range.before.seconds)
-    paused = fast.go_on(
+    return fast.go_on(
         spec.scene,
         n_particles=block_range.n,
         energy=spec.energy,
@@ -61,10 +59,8 @@ def follow(
         threads=threads,
         phases=spec.phases,
         progress=on_progress,
-        before=before,
+        before=block_range.before,
     )
-    ensemble = paused.ensemble
-    return Block(columns(paused), ensemble.seconds * ensemble.threads)
 
 
 def in_process(
@@ -75,7 +71,7 @@ def in_process(
         yield block_range, follow(spec, block_range, threads, on_progress)
 
 
-def follow_elsewhere(version: str, spec: RunSpec, block_range: BlockRange, threads: int) -> Block:
+def follow_elsewhere(version: str, spec: RunSpec, block_range: BlockRange, threads: int) -> Paused:
     """Follow a block on a worker, which must be of the version that asks.
 
     Raises:
@@ -319,7 +315,7 @@ def complete(
     with closing(engine(run.spec, block_ranges, report)) as found, ThreadPoolExecutor(1) as writer:
         under_way: Future[None] | None = None
         for block_range, block in found:
-            most = int(block.arrays["wall_counts"].sum(axis=1).max())
+            most = int(block.ensemble.n_collisions.max())
             if max_collisions is not None and most > max_collisions:
                 made = f"a particle of block {block_range.number} makes {most} collisions"
                 raise LimitReached(f"{made}, --max-collisions = {max_collisions}")
@@ -341,19 +337,19 @@ def _probe(run: StoredRun) -> None:
     there = run.first_there()
     if there is None:
         return
-    stored = {name: array[:PROBED] for name, array in run.block(there).arrays.items()}
-    n, n_cycles = stored["cycle_energies"].shape
+    stored = run.block(there, PROBED)
+    n, n_cycles = stored.ensemble.cycle_energies.shape
     block_range, spec = BlockRange(there, there * run.shape.block, n), run.spec
-    first = follow(spec._replace(n_cycles=n_cycles), block_range, None)
-    _compare(run, stored, first.arrays)
+    _compare(run, stored, follow(spec._replace(n_cycles=n_cycles), block_range, None))
     if n_cycles < spec.n_cycles:
-        longer = follow(spec, block_range._replace(before=first._replace(arrays=stored)), None)
-        _compare(run, longer.arrays, follow(spec, block_range, None).arrays)
+        longer = follow(spec, block_range._replace(before=stored), None)
+        _compare(run, longer, follow(spec, block_range, None))
 
 
-def _compare(run: StoredRun, ones: Arrays, others: Arrays) -> None:
-    for name, one in ones.items():
-        if not np.array_equal(one, others[name], equal_nan=one.dtype.kind == "f"):
+def _compare(run: StoredRun, one: Paused, other: Paused) -> None:
+    ones, others = columns(one), columns(other)
+    for name in run.shape.names:
+        if not np.array_equal(ones[name], others[name], equal_nan=ones[name].dtype.kind == "f"):
             made, here = attributes_of(run.folder), made_by()
             by = next((key for key in here if made.get(key) != here[key]), "versions")
             raise BadInput(

@@ -27,7 +27,7 @@ import numpy as np
 import zarr
 
 from conformance.files import sealed, unsealed, write_file
-from fast import Ensemble
+from fast import Ensemble, Paused
 from mushrooms.output import TABLES, check_file
 from mushrooms.store.spec import (
     FIELDS,
@@ -38,6 +38,7 @@ from mushrooms.store.spec import (
     Arrays,
     RunSpec,
     Shape,
+    columns,
     made_by,
     paused_of,
     shape_of,
@@ -68,24 +69,7 @@ class BlockRange(NamedTuple):
     number: int
     first: int
     n: int
-    before: Block | None = None
-
-
-class Block(NamedTuple):
-    """Results of the particles of a block.
-
-    Attributes:
-        arrays: as stored.
-        seconds: kernel time x threads [s].
-    """
-
-    arrays: Arrays
-    seconds: float
-
-    @property
-    def tally(self) -> RunTally:
-        """Count what became of the particles."""
-        return tally_of(self.arrays)
+    before: Paused | None = None
 
 
 class Marker(NamedTuple):
@@ -95,7 +79,7 @@ class Marker(NamedTuple):
         run, number: the run's identity, and the block's number.
         rows, cycles: how many particles it holds, and through how many cycles they were followed.
         sums: SHA-256 of each array's numbers.
-        seconds: see `Block`.
+        seconds: kernel time x threads [s].
     """
 
     run: str
@@ -154,19 +138,18 @@ class StoredRun:
         whole = {number: marker.cycles == self.shape.n_cycles for number, marker in self._markers.items()}
         return min(whole, key=lambda number: (whole[number], number), default=None)
 
-    def block(self, number: int) -> Block:
-        """Return a block, with as many cycles as it has.
+    def block(self, number: int, most: int | None = None) -> Paused:
+        """Return the particles of a block, or the first ones, with as many cycles as it has.
 
         Raises:
             BadInput: it is missing or damaged.
         """
-        arrays = {name: self.read(number, name) for name in self.shape.names}
-        return Block(arrays, self._markers[number].seconds)
+        arrays = {name: self.read(number, name)[:most] for name in self.shape.names}
+        return paused_of(arrays, self.spec.energy, self._markers[number].seconds)
 
     def check(self) -> list[int]:
         """Read every block, count those that are as they were written, and return the damaged ones."""
         damaged = []
-        self._markers, self.tally, self.seconds = {}, RunTally(), 0.0
         for pattern in (".*.part", "*.partial"):  # what we, or zarr, were writing when the process ended
             for path in self.folder.rglob(pattern):
                 path.unlink(missing_ok=True)
@@ -176,13 +159,13 @@ class StoredRun:
             if self._path(number).exists():
                 try:
                     self._markers[number] = self._marker(number)
-                    self._count(self._markers[number], self.block(number).tally)
+                    self._count(self._markers[number], tally_of(self.block(number).ensemble))
                 except BadInput:
                     self._markers.pop(number, None)
                     damaged.append(number)
         return damaged
 
-    def keep(self, block_range: BlockRange, block: Block) -> None:
+    def keep(self, block_range: BlockRange, block: Paused) -> None:
         """Write a block: first its arrays, then its marker.
 
         Raises:
@@ -190,20 +173,32 @@ class StoredRun:
         """
         if not self._arrays:
             self.describe()
-        number, first, n, _ = block_range
-        for name in self.shape.names:
-            self._arrays[name][first : first + n] = block.arrays[name]
-        sums = {name: _sum(block.arrays[name]) for name in self.shape.names}
-        marker = Marker(self._identity, number, n, self.shape.n_cycles, sums, block.seconds)
+        number, first, n, before = block_range
+        arrays = {name: array for name, array in columns(block).items() if name in self.shape.names}
+        there = 0 if before is None else before.ensemble.cycle_energies.shape[1]
+        for name, array in arrays.items():
+            rows = self._arrays[name]
+            if there and "cycle" in FIELDS[name].dims:  # the chunks of earlier cycles stay
+                rows[first : first + n, there:] = array[:, there:]
+            else:
+                rows[first : first + n] = array
+        sums = {name: _sum(array) for name, array in arrays.items()}
+        seconds = block.ensemble.seconds * block.ensemble.threads
+        marker = Marker(self._identity, number, n, self.shape.n_cycles, sums, seconds)
         write_file(self._path(number), sealed(json.dumps(marker._asdict()).encode()))
-        self._count(marker, block.tally)
+        self._count(marker, tally_of(block.ensemble))
 
     def describe(self) -> None:
         """Write the metadata of the group and of its arrays; chunks that are there stay."""
         (self.folder / MARKERS).mkdir(exist_ok=True)
-        sizes = {"particles": self.shape.n_particles, "block": self.shape.block}
-        sizes |= {"cycles_of_a_chunk": self.shape.chunked}
-        attributes = self.spec.to_data() | sizes | {"command": self.command} | made_by()
+        attributes = {
+            **self.spec.to_data(),
+            "particles": self.shape.n_particles,
+            "block": self.shape.block,
+            "cycles_of_a_chunk": self.shape.chunked,
+            "command": self.command,
+            **made_by(),
+        }
         write_file(self.folder / MARKERS / DESCRIPTION, sealed(json.dumps(attributes).encode()))
         for path in (self.folder / GROUP).rglob("zarr.json"):
             path.unlink()
@@ -385,7 +380,6 @@ def open_run(folder: Path) -> StoredRun:
     return run
 
 
-MAX_COLUMNS = 10_000
 TIMES = ("seconds", "threads")
 
 
@@ -398,27 +392,23 @@ def write_npz(run: StoredRun, file: BinaryIO) -> None:
 
 def _tables(run: StoredRun) -> Iterator[Arrays]:
     """Yield each block as columns by their names."""
-    shape, names = run.shape, [name for name in run.shape.names if name != LANES]
-    n_columns = sum(int(np.prod(shape.of(name, 1, shape.n_cycles))) for name in names)
-    if n_columns > MAX_COLUMNS:
-        raise BadInput(f"a table of {n_columns} columns, must be at most {MAX_COLUMNS}: read it with xarray")
-    for number in range(shape.n_blocks):
-        first = number * shape.block
-        columns: Arrays = {"particle": np.arange(first, first + shape.rows(number))}
-        for name in names:
+    for number in range(run.shape.n_blocks):
+        first = number * run.shape.block
+        table: Arrays = {"particle": np.arange(first, first + run.shape.rows(number))}
+        for name in [name for name in run.shape.names if name != LANES]:
             array = run.read(number, name)
             for place in product(*map(range, array.shape[1:])):
                 words = [WALLS[i] if FIELDS[name].dims[-1] == "wall" else str(i + 1) for i in place]
                 at: Any = (slice(None), *place)
-                columns["_".join([name, *words])] = array[at]
-        yield columns
+                table["_".join([name, *words])] = array[at]
+        yield table
 
 
 def export_run(run: Path, to: Path) -> None:
     """Write a finished run as one table.
 
     Raises:
-        BadInput: a block is damaged, a table has too many columns, or pyarrow is not installed.
+        BadInput: a block is damaged, or pyarrow is not installed.
     """
     check_file(to, (".parquet", ".csv", ".npz"))
     found = open_run(run)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from mpmath import fp
 
 import theory
-from fast.ensemble import FOLLOWED, UNDECIDED, one_cycle
+from fast.ensemble import FOLLOWED, UNDECIDED, Ensemble, one_cycle
 from mushrooms.store.spec import RunSpec
 from scene import BadInput, Cap, Mushroom, Scene, Stem
 from scene.geometry import table_at
@@ -41,18 +41,17 @@ class RunTally(NamedTuple):
         return RunTally(*(a + b for a, b in zip(self, other, strict=True)))
 
 
-def tally_of(arrays: dict[str, npt.NDArray[Any]]) -> RunTally:
-    """Return the tally of particles, given the arrays that a store keeps of them."""
-    n_collisions, takes_part = arrays["wall_counts"].sum(axis=1), arrays["takes_part"] == 1
-    was_followed = arrays["outcome"] == FOLLOWED
+def tally_of(found: Ensemble) -> RunTally:
+    """Return the tally of an ensemble."""
+    was_followed = found.outcome == FOLLOWED
     return RunTally(
-        particles=len(n_collisions),
+        particles=len(found.outcome),
         followed=int(was_followed.sum()),
-        undecided=int((arrays["outcome"] == UNDECIDED).sum()),
-        collisions=int(n_collisions.sum()),
-        careful=int(arrays["n_careful"].sum()),
-        met=int(n_collisions[was_followed].sum()),
-        captured=int(np.isfinite(arrays["t_in"][takes_part]).any(axis=2).sum()) if "t_in" in arrays else 0,
+        undecided=int((found.outcome == UNDECIDED).sum()),
+        collisions=int(found.n_collisions.sum()),
+        careful=int(found.n_careful.sum()),
+        met=int(found.n_collisions[was_followed].sum()),
+        captured=int(np.isfinite(found.t_in[found.takes_part()]).any(axis=2).sum()),
     )
 
 
@@ -129,9 +128,14 @@ def _size(scene: Scene, t: float) -> tuple[float, float]:
     return float(now.cap_area() + now.stem_area()), float(top + (0 if isinstance(scene, Cap) else stem))
 
 
-def careful_note(n_careful: int, n_collisions: int, seconds: float) -> str | None:
-    """Return a line on careful steps, if a run took a second and they took over a tenth of its time."""
-    share = n_careful / max(n_collisions, 1)
+def careful_note(summary: Mapping[str, Any]) -> str | None:
+    """Return a line on careful steps if a run took a second of one core, a tenth of it for them, or more.
+
+    Args:
+        summary: as `mushrooms simulate` prints it.
+    """
+    seconds = summary["ns_per_collision"] * summary["collisions"] / 1e9
+    share = summary["careful"] / max(summary["collisions"], 1)
     part = CAREFUL_COST * share / (1.0 + (CAREFUL_COST - 1.0) * share)
     if seconds < 1.0 or part <= 0.1:
         return None

@@ -53,16 +53,21 @@ class Transform(NamedTuple):
             t_end=vector.t_end * 2.0**self.time,
         )
 
-    def restore(self, answer: Any) -> Any:
-        """Return an answer to the image of a question as one to the question as published."""
+    def restore(self, answer: Any, exponent: int = 0) -> Any:
+        """Return an answer to the image of a question as one to the question as published.
+
+        Args:
+            answer: or a part of one.
+            exponent: of the power of two that a number is multiplied with.
+        """
         if isinstance(answer, list | tuple):
-            return [self.restore(part) for part in answer]
+            return [self.restore(part, exponent) for part in answer]
         if not isinstance(answer, dict):
-            return answer
+            return answer * 2.0**exponent if exponent and isinstance(answer, int | float) else answer
         exponents = dict.fromkeys(("dt", "t", "captured"), -self.time)
         exponents |= dict.fromkeys(("x", "y"), -self.length)
         exponents |= dict.fromkeys(("vx", "vy"), self.time - self.length)
-        found = {name: _scaled(self.restore(part), exponents.get(name, 0)) for name, part in answer.items()}
+        found = {name: self.restore(part, exponents.get(name, 0)) for name, part in answer.items()}
         if self.is_mirrored:
             found |= {name: -found[name] for name in ("x", "vx") if isinstance(found.get(name), float)}
             if isinstance(answer.get("wall"), str):
@@ -92,10 +97,3 @@ def _stays_in_range(vector: Vector, length: int, time: int) -> bool:
         numbers += [float(end) for name in NUMBERS for end in getattr(step, name)]
     factors = [2.0**k for k in (0, length, time, -time, length - time)]
     return all(least < abs(number) * factor < most for number in numbers if number for factor in factors)
-
-
-def _scaled(part: Any, exponent: int) -> Any:
-    """Return a number, or a list of numbers, times a power of two; what is none stays as it is."""
-    if isinstance(part, list) and exponent:
-        return [_scaled(one, exponent) for one in part]
-    return part * 2.0**exponent if exponent and isinstance(part, int | float) else part

@@ -33,7 +33,7 @@ from conformance import plain, vectors
 from conformance.grading.agreement import grade
 from conformance.harness import kit
 from conformance.harness.examples import Example, find_examples, find_kit_examples
-from conformance.suite import answers, reports
+from conformance.suite import reports, session
 from conformance.suite import run as suite
 from conformance.suite.checks import ensembles, timing
 from conformance.suite.process import CheckFailure
@@ -245,12 +245,12 @@ def test_a_server_answers_every_line_with_one_line(name, tally):
 def test_the_runner_reads_every_line_or_says_wrong_format(tally):
     vector = made_up(0)
     for line in fuzz.lines(2, N_LINES, fuzz.answers):
-        for read in (answers.read_introduction, lambda sent: answers.check_echo([0.1, -0.0], sent)):
+        for read in (session.read_introduction, lambda sent: session.check_echo([0.1, -0.0], sent)):
             with suppress(CheckFailure):
                 read(line)
-        for cmd in answers.ANSWERS:
+        for cmd in session.ANSWERS:
             try:
-                found = grade(vector, answers.read_answer(line, cmd, 1))
+                found = grade(vector, session.read_answer(line, cmd, 1))
             except CheckFailure as trouble:
                 found = trouble
             assert "\n" not in found.why

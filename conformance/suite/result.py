@@ -38,7 +38,7 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
         why: one line.
         seconds: until the answer.
         level: of a vector.
-        asked: the symmetry transform by which it was asked (`suite.symmetry`).
+        asked: the symmetry transform by which it was asked (`suite.run`).
         ulps: worst backward ulps, absent when not measured (or beyond binary64).
         relative: worst backward error, likewise.
         answer: what the implementation said, taken back to the question as it is published.

@@ -29,13 +29,21 @@ import msgspec
 
 from conformance import plain, vectors
 from conformance.files import write_files
-from conformance.suite.answers import UNREADABLE, check_echo, read_answer, read_introduction, with_walls
 from conformance.suite.checks import checks_of, ensembles, run_check
 from conformance.suite.checks.form import QUESTIONS, SuiteCheck
 from conformance.suite.process import CheckFailure, clean
 from conformance.suite.result import Run, parts_needed
 from conformance.suite.run import RunQuestions, ask_nonsense, converse
-from conformance.suite.session import MAX_SEQ, Session, probe_values
+from conformance.suite.session import (
+    MAX_SEQ,
+    UNREADABLE,
+    Session,
+    check_echo,
+    probe_values,
+    read_answer,
+    read_introduction,
+    with_walls,
+)
 from conformance.vectors import LEVELS, Vector
 from scene.protocol.messages import PROTOCOL, Echoed, Introduction
 from scene.protocol.wire import serve

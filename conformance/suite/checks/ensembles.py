@@ -14,9 +14,9 @@ import theory
 from conformance import profiles, properties
 from conformance.cases.draw import Draw
 from conformance.profiles import Statistic
-from conformance.suite.answers import read_outcome
 from conformance.suite.checks.form import Implementation, Question, SuiteCheck
 from conformance.suite.process import CheckFailure
+from conformance.suite.session import read_outcome
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, load
 from scene.geometry import area
 from scene.protocol.wire import Captured, Flowing

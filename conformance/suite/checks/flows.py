@@ -13,7 +13,6 @@ from msgspec.structs import replace
 
 from conformance import plain
 from conformance.cases.draw import Draw
-from conformance.suite.answers import read_outcome
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
 from conformance.suite.checks.paths import (
     CARRIED,
@@ -25,6 +24,7 @@ from conformance.suite.checks.paths import (
     nearly_captured,
 )
 from conformance.suite.checks.requests import INSIDE, RESTING, move_inwards
+from conformance.suite.session import read_outcome
 from scene import (
     Cap,
     Collision,

@@ -13,8 +13,6 @@ Numbers may be decimal, with Fortran's exponent D too, or hexadecimal as C's %a 
 Not in a sheet: how a process behaves, lines that are no questions, checks that go on from an answer, time.
 """
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io

@@ -42,7 +42,7 @@ from conformance.harness.examples import Example, find_examples, find_kit_exampl
 from conformance.mutants import COMMON, MUTANTS, PLAIN
 from conformance.suite import checks, reports, session
 from conformance.suite import run as suite
-from conformance.suite.checks import ensembles, requests, timing
+from conformance.suite.checks import flows, requests, timing
 from conformance.suite.checks.flows import MAX_STATES
 from conformance.suite.checks.form import Draw, octaves, run_check
 from conformance.suite.process import CheckFailure
@@ -96,7 +96,7 @@ def test_an_example_passes_at_level_core(language, commands, monkeypatch, tally)
     command = runnable(commands[language])
     chosen = vectors.load("core")[:: EVERY[language]]
     monkeypatch.setattr(suite, "choose", lambda *_: chosen)
-    monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
+    monkeypatch.setitem(flows.SIZES, "core", flows.Size(20, 50.0, 0.5))
     run = suite.check(command, seed=1)
     assert (run.objections(), run.exit_code()) == ([], 0)
     lacking = [result for result in run.results if result.verdict == "unsupported"]
@@ -293,7 +293,7 @@ def test_nonsense_ends_in_verdicts(monkeypatch, tally):
     monkeypatch.setattr(suite, "TIMED_LEAST", 1)
     monkeypatch.setattr(timing, "READABLE", 1e-4)
     monkeypatch.setattr(timing, "MAX_REPEAT", 8)
-    monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(6, 2.0, 0.5))
+    monkeypatch.setitem(flows.SIZES, "core", flows.Size(6, 2.0, 0.5))
     for seed in range(N_RUNS):
         draw = random.Random(seed)
         share = draw.choice((0.02, 0.1, 0.5))
@@ -485,9 +485,7 @@ def flow_of(name: str):
 
 
 # A slow particle is sooner done; 20 particles cannot tell anything from anything.
-SMALL, SLOW, LITTLE = (
-    ensembles.Size(*size) for size in ((100, 1000.0, 0.08), (400, 20.0, 0.2), (20, 20.0, 0.3))
-)
+SMALL, SLOW, LITTLE = (flows.Size(*size) for size in ((100, 1000.0, 0.08), (400, 20.0, 0.2), (20, 20.0, 0.3)))
 
 
 @pytest.mark.parametrize(
@@ -515,6 +513,6 @@ SMALL, SLOW, LITTLE = (
     ],
 )
 def test_ensembles_tell_a_mutant_from_an_honest_stepper(monkeypatch, name, case, size, verdict):
-    monkeypatch.setitem(ensembles.SIZES, "core", size)
+    monkeypatch.setitem(flows.SIZES, "core", size)
     found = verdict_on(flow_of(name), f"profile/{case}", 3)
     assert found.verdict == verdict, found.why

@@ -27,7 +27,7 @@ import msgspec
 
 from conformance import plain, vectors
 from conformance.files import write_files
-from conformance.suite.checks import checks_of, ensembles, run_check
+from conformance.suite.checks import checks_of, flows, run_check
 from conformance.suite.checks.form import QUESTIONS, SuiteCheck
 from conformance.suite.process import CheckFailure, clean
 from conformance.suite.result import Run, parts_needed
@@ -64,7 +64,7 @@ CHECKS: dict[str, tuple[str, ...]] = {
     "promise/long-flow": ("flow",),
     "promise/many-particles": ("flow",),
     "promise/endings": QUESTIONS,
-    **dict.fromkeys((f"profile/{name}" for name in ensembles.PROFILES), ("flow",)),
+    **dict.fromkeys((f"profile/{name}" for name in flows.PROFILES), ("flow",)),
 }
 NOT_IN_FILES = ("behaviour as a process", "malformed lines", "checks that go on from an answer")
 REJECTS = "protocol/rejects"

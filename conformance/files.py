@@ -3,8 +3,6 @@
 A file gets its name only when it is complete and on the disk. A sealed one ends in its own SHA-256.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Callable, Iterator, Mapping

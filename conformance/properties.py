@@ -492,11 +492,10 @@ def scales(scene: Scene, state: State) -> tuple[float, float, float]:
 
 def numbers(outcome: Outcome, state: State) -> Numbers | None:
     """Return dt, t, x, y, vx, vy of a collision or horizon, else None."""
-    if isinstance(outcome, Collision):
-        return (outcome.dt, outcome.t, outcome.x, outcome.y, outcome.vx, outcome.vy)
-    if isinstance(outcome, Horizon):
-        return (outcome.t - state.t, outcome.t, outcome.x, outcome.y, outcome.vx, outcome.vy)
-    return None
+    if not isinstance(outcome, Collision | Horizon):
+        return None
+    dt = outcome.dt if isinstance(outcome, Collision) else outcome.t - state.t
+    return dt, outcome.t, outcome.x, outcome.y, outcome.vx, outcome.vy
 
 
 def measure_step(

@@ -26,12 +26,10 @@ from conformance.cases.table import FAMILIES
 from conformance.files import write_file
 from conformance.grading.agreement import middle
 from conformance.suite import Result, ask_vector
-from conformance.suite.answers import outcomes_of
 from conformance.suite.process import CheckFailure
-from conformance.suite.run import N_FRESH
-from conformance.suite.session import Session
+from conformance.suite.run import N_FRESH, Transform, draw_transform
+from conformance.suite.session import Session, outcomes_of
 from conformance.suite.sheet import read_number, read_rows
-from conformance.suite.symmetry import Transform, draw_transform
 from conformance.vectors import Vector
 from mushrooms.check import format_outcome
 from mushrooms.output import announce_compilation, check_file, new_console, progress_bar

@@ -39,11 +39,10 @@ from conformance.grading.agreement import SHARP, grade, middle
 from conformance.mutants import MUTANTS, Mutant
 from conformance.mutants.laws import single
 from conformance.mutants.mutant import make_mutant
-from conformance.mutants.roots import TieBlind
-from conformance.mutants.walls import UPRIGHT
+from conformance.mutants.walls import UPRIGHT, TieBlind
 from conformance.plain.step import MAX_COLLISIONS, BangBangMotion, ConstantMotion, Flight, PlainPath
 from conformance.suite.checks import checks_of
-from conformance.suite.symmetry import Transform, draw_transform
+from conformance.suite.run import Transform, draw_transform
 from conformance.verify import Verdict, verify_line
 from fast import paths
 from fast.__main__ import carry, follow

@@ -15,7 +15,7 @@ from conformance import plain, vectors
 from conformance.harness.examples import FOLDER, compiled, find_examples
 from conformance.suite import run as suite
 from conformance.suite import sheet as sheets
-from conformance.suite.checks import ensembles
+from conformance.suite.checks import flows
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
 from scene.refusal import BadInput
@@ -44,7 +44,7 @@ def _few():
         patch.setattr(suite, "choose", lambda *_: found)
         patch.setattr(suite, "N_FRESH", dict.fromkeys(suite.N_FRESH, 1))
         patch.setattr(sheets, "CHECKS", {name: sheets.CHECKS[name] for name in SOME})
-        patch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
+        patch.setitem(flows.SIZES, "core", flows.Size(20, 50.0, 0.5))
         yield
 
 

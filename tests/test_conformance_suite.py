@@ -22,11 +22,10 @@ from conformance import vectors
 from conformance.mutants.kill_matrix import diagnose
 from conformance.suite import reports
 from conformance.suite import run as suite
-from conformance.suite.answers import read_answer
 from conformance.suite.process import CheckFailure, CommandNotFound
 from conformance.suite.result import VERDICTS, Result, Run
-from conformance.suite.session import Limits, Session, missing
-from conformance.suite.symmetry import Transform
+from conformance.suite.run import Transform
+from conformance.suite.session import Limits, Session, missing, read_answer
 from conformance.vectors import Certified, Expectation, Vector
 from scene import State
 from scene.protocol.messages import Introduction, with_minus_zeros

@@ -22,7 +22,7 @@ from support.depth import deep_but
 from support.schemas import MODULES, validator
 
 from conformance import plain, vectors
-from conformance.suite.answers import read_answer
+from conformance.suite.session import read_answer
 from mushrooms import gallery
 from scene import BadInput, load
 from scene.load import catalogue, catalogue_text, from_data

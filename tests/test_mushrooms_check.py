@@ -26,7 +26,7 @@ from conformance import plain, vectors
 from conformance.bench import record, workloads
 from conformance.suite import pytest_suite
 from conformance.suite import run as suite
-from conformance.suite.checks import ensembles
+from conformance.suite.checks import flows
 from conformance.suite.session import Session
 from mushrooms import bench, output
 from mushrooms.reports import bench_page
@@ -43,7 +43,7 @@ def _few(monkeypatch):
     ]
     assert {vector.kind for vector in found} == {"step", "trajectory"}
     monkeypatch.setattr(suite, "choose", lambda *_: found)
-    monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
+    monkeypatch.setitem(flows.SIZES, "core", flows.Size(20, 50.0, 0.5))
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
     monkeypatch.setattr(output, "FIRST", math.inf)
 

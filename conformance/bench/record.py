@@ -176,12 +176,6 @@ def read(path: Path) -> Record:
         raise BadInput(f"{path} is no bench.json: {error}") from None
     if record.format != FORMAT:
         raise BadInput(f"{path}: format = {record.format}, must be {FORMAT}")
-    names, seen = {drawn.name for drawn in record.workloads}, set[tuple[str, str]]()
-    for p in record.points:
-        if p.workload not in names or (p.workload, p.solver) in seen:
-            why = "twice" if p.workload in names else "of a workload that it does not name"
-            raise BadInput(f"{path} is no bench.json: a point of {p.solver!r} on {p.workload!r} is {why}")
-        seen.add((p.workload, p.solver))
     return record
 
 

@@ -9,7 +9,7 @@ the same rule, whose walls a stepper that the caller trusts has named.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from conformance.cases.draw import Draw
@@ -193,48 +193,38 @@ def draw_workload(
     questions = [_question(rule, scene, f"bench {seed} {rule.name} {i}", prove) for i in range(n_questions)]
     if trust is not None:
         key = f"bench {seed} {rule.name} further"
-        further = [_further_step(rule, scene, f"{key} {i}", trust) for i in range(n_further)]
+        drawn = [_draw_step(rule, scene, f"{key} {i}", trust) for i in range(n_further)]
+        further = [FurtherStep(state, wall) for state, _, wall in drawn]
     return Workload(rule.name, rule.what, scene, questions, rule.length, further)
 
 
-def _starts(rule: Rule, scene: Scene, key: str, step: Stepper) -> Iterator[Drawn]:
-    """Draw starts until one is taken; where the rule says so, each is flown to its first collision."""
+def _draw_step(rule: Rule, scene: Scene, key: str, step: Stepper) -> tuple[State, float, Wall]:
+    """Draw a start, its horizon and the wall it meets; the rule may say that it is flown to its first hit.
+
+    No step of the cap begins or ends at its base: the lanes unfold the disk, from arc to arc.
+    """
     span, size = scene.period or 1.0, rounded(scene, 0.0).size
     for attempt in range(MAX_DRAWS):
         stream = Draw(f"{key} {attempt}")
         t = span * PHASE + stream.part() * min(span, FLIGHTS * size / rule.speed)
         start, t_end = rule.draw(stream, scene, t)
-        if rule.is_flown:
-            met = step(scene, start, t_end)
-            if not isinstance(met, Collision):
-                continue
+        met = step(scene, start, t_end)
+        if rule.is_flown and isinstance(met, Collision):
             start, t_end = met.state(), t_end + met.t - start.t
-        yield start, t_end
+            met = step(scene, start, t_end)
+        if not isinstance(met, Collision):
+            continue
+        if not isinstance(scene, Cap) or "base" not in (start.wall, met.wall):
+            return start, t_end, met.wall
     raise RuntimeError(f"{key}: no collision in {MAX_DRAWS} draws")
-
-
-def _is_folded(scene: Scene, *walls: Wall | None) -> bool:
-    """Tell whether a step of the cap meets its base: the lanes unfold the disk, from arc to arc."""
-    return isinstance(scene, Cap) and "base" in walls
-
-
-def _further_step(rule: Rule, scene: Scene, key: str, trust: Stepper) -> FurtherStep:
-    for start, t_end in _starts(rule, scene, key, trust):
-        met = trust(scene, start, t_end)
-        if isinstance(met, Collision) and not _is_folded(scene, start.wall, met.wall):
-            return FurtherStep(start, met.wall)
-    raise AssertionError
 
 
 def _question(rule: Rule, scene: Scene, key: str, prove: Prover) -> ProvedStep:
     def step(scene: Scene, start: State, t_end: float) -> Outcome:
-        first = prove(scene, start, t_end, 20)
-        return middle(first, start)[0] if first else Undecided("the proof is undecided")
+        found = prove(scene, start, t_end, 20)
+        return middle(found, start)[0] if found else Undecided("the proof is undecided")
 
-    for start, t_end in _starts(rule, scene, key, step):
-        truth = prove(scene, start, t_end, DIGITS)
-        if truth is None or truth.outcome != "collision":
-            continue
-        if not _is_folded(scene, start.wall, truth.steps[0].wall):
-            return ProvedStep(start, t_end, truth)
-    raise AssertionError
+    start, t_end, _ = _draw_step(rule, scene, key, step)
+    truth = prove(scene, start, t_end, DIGITS)
+    assert truth is not None
+    return ProvedStep(start, t_end, truth)

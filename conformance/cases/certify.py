@@ -18,8 +18,8 @@ these happen is enclosed with the path.
 import json
 from collections.abc import Sequence
 from fractions import Fraction
-from math import fsum, inf, isfinite
-from typing import Literal, NamedTuple
+from math import inf, isfinite
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -51,7 +51,6 @@ from scene import (
     State,
     Undecided,
     Undefined,
-    Wall,
     from_data,
 )
 
@@ -62,75 +61,6 @@ CONDITIONS = {"core": 1e6, "extended": 1e12}
 SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
 Matrix = list[list[float]]
 GUARD = 6  # decimals asked of the reference beyond those that are written down
-
-
-class ProvedFlight(NamedTuple):
-    """A flight up to a collision or the horizon, as the reference proved it.
-
-    Attributes:
-        wall: the wall met; None at the horizon.
-        ends: low and high of dt, x, y, vx, vy.
-        jacobian: (5, 5) derivatives of these, in this order, by t, x, y, vx, vy.
-    """
-
-    wall: Wall | None
-    ends: dict[str, Ends]
-    jacobian: Matrix
-
-    def centre(self) -> list[float]:
-        """Return dt, x, y, vx, vy, rounded."""
-        return [float(sum(self.ends[name]) / 2) for name in NUMBERS]
-
-    def allowance(self, state: State) -> list[float]:
-        """Return for dt, x, y, vx, vy the sum over inputs of |d out / d in| |in|."""
-        return [moved(row, inputs_of(state)) for row in self.jacobian]
-
-    def certified(self, state: State, digits: int = DIGITS) -> Certified:
-        """Write it down to so many decimals."""
-        return certified(self.ends, self.allowance(state), self.wall, digits=digits)
-
-
-def ask(scene: Scene, state: State, t_end: float, digits: int = DIGITS) -> reference.Outcome:
-    """Return the reference's outcome, close enough for so many decimals, with its Jacobian."""
-    return reference.next_collision(scene, state, t_end, digits=digits + GUARD, is_differentiated=True)
-
-
-def flight_of(outcome: reference.Collision | reference.Horizon, state: State, t_end: float) -> ProvedFlight:
-    """Return the flight that led to an outcome of `ask`."""
-    if isinstance(outcome, reference.Horizon):
-        dt = Fraction(t_end) - Fraction(state.t)
-        return ProvedFlight(None, _numbers((dt, dt), outcome.at), free_flight(state, float(dt)))
-    return flight_to(outcome)
-
-
-def flight_to(outcome: reference.Collision) -> ProvedFlight:
-    """Return the flight that ends with a collision, which was asked for with its Jacobian."""
-    assert outcome.jacobian is not None
-    largest = max(abs(float(end)) for row in outcome.jacobian for d in row for end in d)
-    jacobian = [[_steepest(d, largest) for d in row] for row in outcome.jacobian]
-    return ProvedFlight(outcome.wall, collided(outcome), jacobian)
-
-
-def _steepest(derivative: reference.Enclosure, largest: float) -> float:
-    """Return a derivative rounded; at a knot, where it is enclosed between two, the greater in size."""
-    low, high = float(derivative.lo), float(derivative.hi)
-    if high - low <= 2.0**-40 * largest:
-        return float(derivative)
-    return max(low, high, key=abs)
-
-
-def expectation(
-    outcome: reference.Outcome, state: State, t_end: float, digits: int = DIGITS
-) -> Expectation | None:
-    """Return an outcome of `ask` as a certified answer; None where it is undecided."""
-    if isinstance(outcome, Undecided):
-        return None
-    if isinstance(outcome, Undefined):
-        return Expectation("undefined", reason=outcome.reason)
-    if isinstance(outcome, Rejected):
-        return Expectation("rejected")
-    flight = flight_of(outcome, state, t_end)
-    return Expectation("collision" if flight.wall else "horizon", (flight.certified(state, digits),))
 
 
 def proved_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS) -> Expectation | None:
@@ -145,7 +75,34 @@ def proved_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS) 
     Returns:
         The certified answer; None where the reference is undecided.
     """
-    return expectation(ask(scene, state, t_end, digits), state, t_end, digits)
+    proved = measured_step(scene, state, t_end, digits)
+    return proved.expect[0] if proved else None
+
+
+def measured_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS) -> Proved | None:
+    """Return a step's certified answer as `proved_step` does, and how delicate it is."""
+    outcome = reference.next_collision(scene, state, t_end, digits=digits + GUARD, is_differentiated=True)
+    links = Links(state)
+    if isinstance(outcome, Undecided):
+        return None
+    if isinstance(outcome, Rejected):
+        return Proved((Expectation("rejected"),))
+    if isinstance(outcome, Undefined):
+        return Proved((Expectation("undefined", reason=outcome.reason),), inf)
+    if isinstance(outcome, reference.Horizon):
+        numbers = coasted(outcome, (Fraction(state.t),) * 2)
+        step = certified(numbers, links.coast(numbers), None, digits=digits)
+        return Proved((Expectation("horizon", (step,)),), links.condition)
+    step = certified(collided(outcome), links.add(outcome), outcome.wall, digits=digits)
+    return Proved((Expectation("collision", (step,)),), links.condition)
+
+
+def _steepest(derivative: reference.Enclosure, largest: float) -> float:
+    """Return a derivative rounded; at a knot, where it is enclosed between two, the greater in size."""
+    low, high = float(derivative.lo), float(derivative.hi)
+    if high - low <= 2.0**-40 * largest:
+        return float(derivative)
+    return max(low, high, key=abs)
 
 
 def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> State:
@@ -187,11 +144,6 @@ def _numbers(dt: Ends, after: reference.Moment) -> dict[str, Ends]:
 def inputs_of(state: State) -> list[float]:
     """Return the five numbers that a step starts from: t, x, y, vx, vy."""
     return [state.t, state.x, state.y, state.vx, state.vy]
-
-
-def moved(row: Sequence[float], inputs: Sequence[float]) -> float:
-    """Return the sum over inputs of |d out / d in| |in|, for the derivatives of one output."""
-    return fsum(abs(d * value) for d, value in zip(row, inputs, strict=True))
 
 
 def free_flight(state: State, dt: float) -> Matrix:
@@ -244,20 +196,19 @@ class Links:
 
     def add(self, found: reference.Collision) -> list[float]:
         """Add a step with its Jacobian, and return what all rounding may do to it."""
-        flight = flight_to(found)
-        allowance = self._chain(flight.jacobian, flight.centre())
+        assert found.jacobian is not None
+        largest = max(abs(float(end)) for row in found.jacobian for d in row for end in d)
+        jacobian = [[_steepest(d, largest) for d in row] for row in found.jacobian]
+        allowance = self._chain(jacobian, collided(found))
         self.state = found.rounded().state()
         return allowance
 
-    def coast(self, horizon: reference.Horizon, since: reference.Enclosure | None) -> Certified:
-        """Return the horizon after the last collision, at time `since`; None for none."""
-        start = Fraction(self.state.t)
-        numbers = coasted(horizon, (start, start) if since is None else ends(since))
-        centre = [float(sum(numbers[name]) / 2) for name in NUMBERS]
-        allowance = self._chain(free_flight(self.state, centre[0]), centre)
-        return certified(numbers, finite(allowance), None, is_wide=True)
+    def coast(self, numbers: dict[str, Ends]) -> list[float]:
+        """Add the flight to the horizon, whose numbers are given; as `add`."""
+        return self._chain(free_flight(self.state, float(sum(numbers["dt"]) / 2)), numbers)
 
-    def _chain(self, jacobian: Matrix, centre: list[float]) -> list[float]:
+    def _chain(self, jacobian: Matrix, numbers: dict[str, Ends]) -> list[float]:
+        centre = [float(sum(numbers[name]) / 2) for name in NUMBERS]
         self.held = np.concatenate([self.held, np.eye(5)[None]])
         self.inputs = np.concatenate([self.inputs, [inputs_of(self.state)]])
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused by `finite`
@@ -265,7 +216,7 @@ class Links:
             moved = np.abs(rows * self.inputs[:, None]).sum(axis=(0, 2))
             rows[:, 0] += self.held[:, 0]
         self.held = rows
-        allowance = [float(part) for part in moved]
+        allowance: list[float] = moved.tolist()
         self.condition = condition_number(centre if self.is_timed else [inf, *centre[1:]], allowance)
         return allowance
 
@@ -310,7 +261,8 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     if len(steps) < len(path.steps):
         end = None
     if isinstance(end, reference.Horizon):
-        steps.append(links.coast(end, path.steps[-1].after.t if path.steps else None))
+        numbers = coasted(end, ends(path.steps[-1].after.t) if steps else (Fraction(state.t),) * 2)
+        steps.append(certified(numbers, finite(links.coast(numbers)), None, is_wide=True))
         links.largest = max(links.largest, links.condition)
     elif end is not None and not isinstance(end, Undefined):
         raise Unfit("the reference is undecided")
@@ -365,7 +317,7 @@ def claimed_path(
     if isinstance(end, Undecided):
         return Expectation("undecided", tuple(steps), end.reason)
     if isinstance(end, reference.Horizon):
-        since = ends(path.steps[-1].after.t) if steps else (Fraction(state.t), Fraction(state.t))
+        since = ends(path.steps[-1].after.t) if steps else (Fraction(state.t),) * 2
         steps.append(certified(coasted(end, since), unknown, None, is_wide=True))
     return Expectation("horizon" if end else "collision", tuple(steps))
 
@@ -502,19 +454,16 @@ def judge(vector: Vector) -> Verdict:
 
 
 def _step(scene: Scene, question: Question) -> Proved:
-    state, t_end = question.state, question.t_end
-    outcome = ask(scene, state, t_end)
-    answer = expectation(outcome, state, t_end)
-    if answer is None:
+    proved = measured_step(scene, question.state, question.t_end)
+    if proved is None:
         raise Unfit("the reference is undecided")
-    if isinstance(outcome, Rejected | Undecided):
-        return Proved((answer,))
-    if isinstance(outcome, Undefined):
+    (answer,) = proved.expect
+    if answer.outcome == "undefined":
         # A stepper in binary64 may find the tie within rounding, and say no more than that.
-        return Proved((answer, Expectation("undecided")), inf)
-    flight = flight_of(outcome, state, t_end)
-    allowance = finite(flight.allowance(state))
-    return Proved((answer,), condition_number(flight.centre(), allowance))
+        return proved._replace(expect=(answer, Expectation("undecided")))
+    for step in answer.steps:
+        finite(step.allowance)
+    return proved
 
 
 def _level(scene: Scene | None, vector: Vector) -> Level:

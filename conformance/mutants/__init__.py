@@ -6,7 +6,7 @@ holds both.
 COMMON are mistakes that a diagnosis names too, though mutants subsume them.
 """
 
-from conformance.mutants import laws, paths, roots, walls
+from conformance.mutants import laws, paths, walls
 from conformance.mutants.mutant import COMMON, MUTANTS, PLAIN, Mutant, make_mutant, mutant
 
 __all__ = [
@@ -18,6 +18,5 @@ __all__ = [
     "make_mutant",
     "mutant",
     "paths",
-    "roots",
     "walls",
 ]

@@ -14,8 +14,8 @@ import pytest
 from conformance import suite
 from conformance.suite.checks import SuiteCheck, run_check
 from conformance.suite.result import Result
+from conformance.suite.run import draw_transform
 from conformance.suite.session import Session
-from conformance.suite.symmetry import draw_transform
 from conformance.vectors import Vector
 
 

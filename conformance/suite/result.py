@@ -8,7 +8,7 @@ no table. What is not in the scope is not accepted, whatever the exit code.
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -20,6 +20,7 @@ from scene.protocol.messages import PROFILES, Introduction
 
 TABLES = ("mushroom", "cap", "stem")
 LAWS = ("fourier", "bang-bang", "constant")
+PARTS = {"profiles": ("profile", PROFILES), "tables": ("table", TABLES), "laws": ("law", LAWS)}
 BAD = ("fail", "crashed", "timed-out", "wrong-format", "error")
 VERDICTS = ("pass", "fail", "indeterminate", "declined", "unsupported", *BAD[1:])
 # An implementation that declines more has not been graded: of all questions, and of those of one group.
@@ -37,7 +38,7 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
         why: one line.
         seconds: until the answer.
         level: of a vector.
-        asked: the symmetry transform by which it was asked (`suite.symmetry`).
+        asked: the symmetry transform by which it was asked (`suite.run`).
         ulps: worst backward ulps, absent when not measured (or beyond binary64).
         relative: worst backward error, likewise.
         answer: what the implementation said, taken back to the question as it is published.
@@ -231,18 +232,17 @@ def graded_parts(passed: Sequence[Vector], *, is_timed: bool) -> dict[str, list[
         is_timed: whether a speed was measured.
     """
     valid = [vector for vector in passed if vector.expect[0].outcome != "rejected"]
-    seen = {need for vector in valid for need in needs(vector.kind, vector.scene)}
+    found = parts_needed((vector.kind, vector.scene) for vector in valid)
     if is_timed:
-        seen.add(("profile", "time"))
-    every = {"tables": ("table", TABLES), "laws": ("law", LAWS), "profiles": ("profile", PROFILES)}
-    found = {part: [n for n in names if (what, n) in seen] for part, (what, names) in every.items()}
-    lacking = [
-        name
-        for part in ("profiles", "tables", "laws")
-        for name in every[part][1]
-        if (every[part][0], name) not in seen
-    ]
+        found["profiles"].append("time")
+    lacking = [name for part, (_, names) in PARTS.items() for name in names if name not in found[part]]
     return {**found, "not_graded": lacking}
+
+
+def parts_needed(questions: Iterable[tuple[str, Mapping[str, Any] | None]]) -> dict[str, list[str]]:
+    """Return the profiles, tables and laws that questions need, each by its profile and its scene."""
+    seen = {need for profile, scene in questions for need in needs(profile, scene)}
+    return {part: [n for n in names if (what, n) in seen] for part, (what, names) in PARTS.items()}
 
 
 def _objection(result: Result, *others: Result) -> str:

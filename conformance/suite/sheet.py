@@ -13,8 +13,6 @@ Numbers may be decimal, with Fortran's exponent D too, or hexadecimal as C's %a 
 Not in a sheet: how a process behaves, lines that are no questions, checks that go on from an answer, time.
 """
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io
@@ -29,15 +27,23 @@ import msgspec
 
 from conformance import plain, vectors
 from conformance.files import write_files
-from conformance.suite.answers import UNREADABLE, check_echo, read_answer, read_introduction, with_walls
-from conformance.suite.checks import checks_of, ensembles, run_check
+from conformance.suite.checks import checks_of, flows, run_check
 from conformance.suite.checks.form import QUESTIONS, SuiteCheck
 from conformance.suite.process import CheckFailure, clean
-from conformance.suite.result import LAWS, TABLES, Run
+from conformance.suite.result import Run, parts_needed
 from conformance.suite.run import RunQuestions, ask_nonsense, converse
-from conformance.suite.session import MAX_SEQ, Session, needs, probe_values
+from conformance.suite.session import (
+    MAX_SEQ,
+    UNREADABLE,
+    Session,
+    check_echo,
+    probe_values,
+    read_answer,
+    read_introduction,
+    with_walls,
+)
 from conformance.vectors import LEVELS, Vector
-from scene.protocol.messages import PROFILES, PROTOCOL, Echoed, Introduction
+from scene.protocol.messages import PROTOCOL, Echoed, Introduction
 from scene.protocol.wire import serve
 from scene.refusal import BadInput, shown
 
@@ -58,7 +64,7 @@ CHECKS: dict[str, tuple[str, ...]] = {
     "promise/long-flow": ("flow",),
     "promise/many-particles": ("flow",),
     "promise/endings": QUESTIONS,
-    **dict.fromkeys((f"profile/{name}" for name in ensembles.PROFILES), ("flow",)),
+    **dict.fromkeys((f"profile/{name}" for name in flows.PROFILES), ("flow",)),
 }
 NOT_IN_FILES = ("behaviour as a process", "malformed lines", "checks that go on from an answer")
 REJECTS = "protocol/rejects"
@@ -215,10 +221,9 @@ class _Replay(Session):
         self._sheet, self._answers = sheet, answers
         questions = [q for seq in answers.lines if (q := sheet.by_number[seq]).case != REJECTS]
         asked = [(q.request["cmd"], q.request["scene"]) for q in questions]
-        seen = {need for cmd, scene in asked for need in needs(cmd, scene if "table" in scene else None)}
-        every = ("profile", PROFILES), ("table", TABLES), ("law", LAWS)
-        offered = (tuple(name for name in names if (what, name) in seen) for what, names in every)
-        self.introduction = Introduction(PROTOCOL, "answers in files", "", "unknown", *offered)
+        offered = parts_needed((cmd, scene if "table" in scene else None) for cmd, scene in asked)
+        names = {part: tuple(names) for part, names in offered.items()}
+        self.introduction = Introduction(PROTOCOL, "answers in files", "", "unknown", **names)
 
     def start(self) -> Introduction:
         if self._answers.introduction is None:

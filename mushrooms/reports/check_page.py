@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 from conformance import vectors
 from conformance.grading.agreement import FAIR, SHARP, middle
 from conformance.suite import reports
-from conformance.suite.answers import outcomes_of
 from conformance.suite.result import Result, Run
+from conformance.suite.session import outcomes_of
 from conformance.vectors import Vector
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as draw

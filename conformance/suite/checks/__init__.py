@@ -1,7 +1,7 @@
 """The checks: what is asked of an implementation beside the vectors, in one table.
 
 Each has one form (`checks.form`): a name, what it asks, how it judges, and of which profiles. Exact
-symmetries (`properties`), statistics (`ensembles`) and the rules of the protocol stand side by side; each is
+symmetries (`properties`), statistics (`flows`) and the rules of the protocol stand side by side; each is
 asked of every profile that is offered. CONTRIBUTING.md says how one is added.
 """
 
@@ -11,7 +11,6 @@ from functools import partial
 from conformance import properties
 from conformance.cases.draw import Draw
 from conformance.suite.checks import flows, paths, requests, timing
-from conformance.suite.checks.ensembles import ensemble_checks
 from conformance.suite.checks.form import QUESTIONS, Implementation, Question, SuiteCheck, run_check
 from conformance.suite.session import AnswerLine, Session
 from scene import Scene, State, transforms
@@ -77,9 +76,9 @@ RULES = (
 )
 
 
-def checks_of(level: str = "core", names: str | tuple[str, ...] = "") -> list[SuiteCheck]:
-    """Return the checks of a level whose names begin with a text, or one of some; all when it is empty."""
-    return [check for check in (*SYMMETRIES, *ensemble_checks(level), *RULES) if check.name.startswith(names)]
+def checks_of(level: str = "core") -> list[SuiteCheck]:
+    """Return the checks of a level."""
+    return [*SYMMETRIES, *flows.ensemble_checks(level), *RULES]
 
 
 def judge(implementation: list[str] | AnswerLine, name: str, profile: str, *asked: object) -> None:

@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 import msgspec
 
 from conformance.cases.draw import Draw
-from conformance.suite.answers import outcomes_of, read_outcome
 from conformance.suite.process import NOT_NUMBERS, CheckFailure
 from conformance.suite.result import Result
-from conformance.suite.session import MAX_SEQ, Session, missing
+from conformance.suite.session import MAX_SEQ, Session, missing, outcomes_of, read_outcome
 from scene import Collision, Outcome, Scene, State, to_data
 from scene.protocol.messages import Introduction
 

@@ -25,8 +25,8 @@ from conformance.cases import scenes
 from conformance.cases.draw import Draw, leaves, readable, wire_form
 from conformance.plain.step import CaptureInterval
 from conformance.properties import BOUND, SLACK
-from conformance.suite.answers import read_outcome
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
+from conformance.suite.session import read_outcome
 from scene import (
     BadInput,
     Cap,

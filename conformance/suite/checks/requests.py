@@ -24,10 +24,10 @@ from msgspec.structs import replace
 
 from conformance.cases import scenes
 from conformance.cases.draw import Draw, wire_form
-from conformance.suite.answers import outcomes_of, read_outcome, with_walls
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
 from conformance.suite.checks.paths import distance, draw_start, is_same_capture
 from conformance.suite.process import CheckFailure
+from conformance.suite.session import outcomes_of, read_outcome, with_walls
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import TableAt, table_at
 from scene.protocol.messages import json_schema
@@ -69,7 +69,8 @@ def bad_requests(draw: Draw, profile: str) -> Iterator[Question]:
         state = INSIDE[type(scene)]
         sound = question(profile, wire_form(scene), state, 0.5)
         yield scene, sound, ""
-        for request, why in broken(sound):
+        form = {"$ref": f"#/$defs/{profile.capitalize()}"}
+        for request, why in _broken(form, sound, ""):
             yield scene, request, why
 
 
@@ -93,20 +94,8 @@ def _schema() -> dict[str, Any]:
     return json_schema()["$defs"]  # type: ignore[no-any-return]
 
 
-def broken(request: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
-    """Break a request in every way that the schema forbids.
-
-    Args:
-        request: valid, with its seq left out.
-
-    Yields:
-        The request with one fault, and what that is.
-    """
-    name = str(request["cmd"]).capitalize()
-    yield from _broken({"$ref": f"#/$defs/{name}"}, request, "")
-
-
 def _broken(schema: Mapping[str, Any], value: Any, where: str) -> Iterator[tuple[Any, str]]:
+    """Break a value that fits a schema in every way that this forbids; yield each fault with what it is."""
     forms = list(_forms(schema))
     own = next((form for form in forms if _fits(form, value)), {})
     if not where.endswith(OWN):

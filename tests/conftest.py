@@ -5,8 +5,6 @@ What long comparisons counted is printed after the tests: nothing is skipped sil
 Workers take whole files, the long ones first, and do not compile what another worker is compiling.
 """
 
-from __future__ import annotations
-
 import fcntl
 import gc
 import json

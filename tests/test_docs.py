@@ -1,7 +1,5 @@
 """The documents hold: what they name exists, their commands and code do what they say, examples are valid."""
 
-from __future__ import annotations
-
 import doctest
 import importlib
 import importlib.util

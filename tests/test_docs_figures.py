@@ -1,7 +1,5 @@
 """What pages say in numbers is what the code says that knows them."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Callable

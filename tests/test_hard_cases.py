@@ -6,8 +6,6 @@ steps stand in support/answers_by_hand.py. That mirror images (cases 43 and 48) 
 held by test_fast_bits.py and test_conformance_properties.py for drawn questions.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """What is published: typed packages, one version and address everywhere, a README with absolute links."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Jacobians of steps and trajectories: differences, the symplectic form, backward ulps."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import random

@@ -4,8 +4,6 @@ Nothing here compares the reference with its own earlier results. Each faulty re
 Further answers: test_hard_cases.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import random

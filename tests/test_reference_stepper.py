@@ -1,7 +1,5 @@
 """The reference: proofs that hold together, and honest non-answers."""
 
-from __future__ import annotations
-
 import math
 import random
 import re

@@ -1,7 +1,5 @@
 """Bounds of laws at all times, and exact algebra."""
 
-from __future__ import annotations
-
 import math
 import random
 import sys

@@ -1,7 +1,5 @@
 """Minima of nu, against brute force: between two, nu rises to one peak and then falls."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Nobody can hold an invalid scene, and every entry of `scene` refuses bad input in one line."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

@@ -1,7 +1,5 @@
 """Validity of scenes over a whole period, and the geometry of a table at one time."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import random

@@ -5,8 +5,6 @@ that tells such captives apart. A probability at their place has all of them, an
 neither lost nor has gained.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

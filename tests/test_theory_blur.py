@@ -1,7 +1,5 @@
 """Finite energy with nothing fitted: its exact parts, its conservation of phase volume, its limits."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """mpmath's constants are shared by all threads: theory holds a lock on them."""
 
-from __future__ import annotations
-
 import threading
 from typing import Any
 

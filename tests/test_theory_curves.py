@@ -1,7 +1,5 @@
 """Sec. 4's curves: energy against capture time, densities of energy and of capture time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpmath import fp

@@ -1,7 +1,5 @@
 """Secs. 3.2 and 3.5: where nu falls and rises, capture and release times, refusals."""
 
-from __future__ import annotations
-
 import importlib
 import re
 from fractions import Fraction

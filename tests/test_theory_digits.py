@@ -1,7 +1,5 @@
 """Many digits: sums of cosines by halving, roots found with few digits first, parts tried at few points."""
 
-from __future__ import annotations
-
 import pytest
 from mpmath import MPContext
 

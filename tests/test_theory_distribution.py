@@ -1,7 +1,5 @@
 """Secs. 3.5 and 4: densities and distribution functions of one cycle, sums of many cycles."""
 
-from __future__ import annotations
-
 import mpmath
 import numpy as np
 import pytest

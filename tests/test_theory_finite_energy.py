@@ -1,7 +1,5 @@
 """What finite energy adds: widths, biases, fits over energy (theory/equations.md)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

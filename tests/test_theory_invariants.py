@@ -1,7 +1,5 @@
 """Sec. 3: invariants of the cap, and energy drifting in each zone (Eqs dEe, dE)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """P(E_n < E_0): its rate, its symmetry under reversal, and the probabilities themselves."""
 
-from __future__ import annotations
-
 import mpmath
 import numpy as np
 import pytest

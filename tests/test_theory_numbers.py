@@ -1,7 +1,5 @@
 """Numbers that `theory` is given: of any kind, of one number system, as large as binary64 holds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any

@@ -1,7 +1,5 @@
 """Secs. 3.4, 3.5 and 4: capture, growth rate, energies; the paper's figures and exact identities."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Frozen rates are those of one cycle, however it is written, and of no other."""
 
-from __future__ import annotations
-
 import math
 
 import msgspec

@@ -1,7 +1,5 @@
 """Every public entry of `theory` refuses bad input in one line that names the field."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -1,7 +1,5 @@
 """A solution that is kept is the one that would be found again, and belongs to nobody."""
 
-from __future__ import annotations
-
 from itertools import islice
 from typing import Any
 

@@ -1,7 +1,5 @@
 """When a cycle is trivial: V_cap / V the same at each capture and its release, whatever the loop encloses."""
 
-from __future__ import annotations
-
 import mpmath
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Upright stems: what the cap does to flights along the base, and the log(v) / v that comes of it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

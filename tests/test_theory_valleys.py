@@ -1,7 +1,5 @@
 """Secs. 3.2 to 3.5 with several captures per cycle: nesting, the Markov chain, exact identities."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sec. 2 of the paper: volumes of cap, stem, island and chaotic zone."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -8,8 +8,6 @@ tail. The formulas spread the atom of particles never captured, p_nc^n, over its
 not small they are wrong near n s_nc.
 """
 
-from __future__ import annotations
-
 from math import factorial
 
 import numpy as np

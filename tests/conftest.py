@@ -59,7 +59,6 @@ LONGEST = [
     "test_conformance_properties.py",
     "test_theory_distribution.py",
     "test_conformance_bench.py",
-    "test_theory_large_deviations.py",
     "test_fast_stays.py",
 ]
 

@@ -10,7 +10,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.saddle import Saddle
 
 import theory
 from scene import BangBang, Mushroom, load
@@ -95,10 +94,3 @@ def test_the_uncaptured_of_a_loop_that_is_its_own_reverse_are_not_lost(n: int) -
     gained = p[0] - np.trapezoid(np.exp(-s) * p, s)
     assert theory.loss_probability(found, n) == pytest.approx(gained, rel=3e-4)
     assert float(sums.cdf(0.0)) > gained + 0.4 * found.p_nc**n  # a distribution function has them
-
-
-def test_losses_of_as_many_cycles_as_are_allowed() -> None:
-    found = energies(load("moving-cap"))
-    for n in (2_000, 10_000):
-        saddle = float(Saddle(found).below([0.0], n)[0])
-        assert theory.loss_probability(found, n) == pytest.approx(saddle, rel=1 / n)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import ncx2
+from scipy.stats import ncx2, norm
 from support.depth import deep_among, deep_but
 
 import theory
@@ -34,19 +34,21 @@ def test_the_blur_is_a_brownian_motion_in_four_dimensions(variance: float) -> No
 
 
 def test_the_diffusion_that_keeps_the_measure_de_has_this_blur() -> None:
+    """It drifts by a quarter of its variance, and exp(-s / 2) has no bias."""
     rng, n, n_steps = np.random.default_rng(7), 100_000, 200
     e, variance = np.full(n, 1e4), 0.05  # of log E, 2 D / E^2 at the start
     for _ in range(n_steps):
         step = variance / n_steps
         e = e + 0.75 * e**0.5 * step * 100 + np.sqrt(e**1.5 * step * 100) * rng.standard_normal(n)
-    s = np.sort(np.log(e / 1e4))
-    gap = np.abs(kernel_cdf(s, variance) - (np.arange(n) + 0.5) / n).max()
-    assert gap < 1.95 / math.sqrt(n)  # p = 1e-3
-    drifted = (s - variance / 4) / math.sqrt(variance)
-    gaussian = np.abs(
-        0.5 * np.array([math.erfc(-z / math.sqrt(2)) for z in drifted]) - (np.arange(n) + 0.5) / n
-    )
-    assert gaussian.max() > 1.95 / math.sqrt(n)
+    s, places = np.sort(np.log(e / 1e4)), (np.arange(n) + 0.5) / n
+    assert np.abs(kernel_cdf(s, variance) - places).max() < 1.95 / math.sqrt(n)  # p = 1e-3
+    gaussian = norm.cdf(s, variance / 4, math.sqrt(variance))
+    assert np.abs(gaussian - places).max() > 1.95 / math.sqrt(n)
+    error = s.std() / math.sqrt(n)
+    assert abs(s.mean() - variance / 4) < 4 * error
+    assert abs(np.exp(-s / 2).mean() - 1) < 4 * error / 2
+    assert abs(s.mean() - variance / 2) > 3 * error
+    assert abs(s.mean()) > 3 * error
 
 
 def phase_volume_gap(name: str, energy: float, width: float = 0.3) -> float:
@@ -202,19 +204,13 @@ def test_kicks_are_remembered_as_their_correlations_say(steps: float, turning: f
     assert found.sum() == pytest.approx(truth, rel=0.01)
 
 
-def known_at(name: str, energy: float) -> FiniteEnergy | None:
-    try:
-        return at_energy(load(name), energy)
-    except theory.NotCovered:
-        return None
-
-
 @pytest.mark.parametrize("name", deep_among(CYCLES, "retraced-arc"))
 @pytest.mark.parametrize("energy", [1e-300, 1e-3, 1.0, 10.0, 100.0, 1e4, 1e6, 1e300])
 def test_at_any_energy_there_is_a_distribution_or_none_is_told(name: str, energy: float) -> None:
     """Corrections of the order v^-1 and v^(-2/3) that outweigh what they correct had left sd = 51 i."""
-    found = known_at(name, energy)
-    if found is None:
+    try:
+        found = at_energy(load(name), energy)
+    except theory.NotCovered:
         assert energy <= 1e4
         return
     assert energy > 10

@@ -10,30 +10,6 @@ from theory import cumulants
 from theory.finite_energy.fits import extrapolate, fit_power, unbiased_mean
 
 
-def diffused(n: int, energy: float, seed: int) -> tuple[np.ndarray, float]:
-    """Draw s of a chaotic cycle from dE = D'(E) dt + sqrt(2 D) dW, D = E^(3/2) / 4: it keeps the measure dE.
-
-    Returns s and its width for a small time, (2 D / E^2)^(1/2).
-    """
-    rng = np.random.Generator(np.random.Philox(seed))
-    e, n_steps = np.full(n, energy), 200
-    for _ in range(n_steps):
-        e = e + 0.375 * np.sqrt(e) / n_steps + np.sqrt(e**1.5 / 2 / n_steps) * rng.standard_normal(n)
-    return np.log(e / energy), float(energy**-0.25 / math.sqrt(2))
-
-
-def test_a_diffusion_that_keeps_phase_volume_drifts_by_a_quarter_of_its_variance() -> None:
-    s, sigma = diffused(40_000, 1e4, 3)
-    width = s.std()
-    assert width == pytest.approx(sigma, abs=4 * sigma / math.sqrt(2 * s.size) + 2e-4)
-    error = sigma / math.sqrt(s.size)
-    assert abs(s.mean() - width**2 / 4) < 4 * error
-    assert abs(np.exp(-s / 2).mean() - 1) < 4 * error / 2
-    # A half, or none, would be seen; and exp(-s) has a bias where exp(-s / 2) has none.
-    assert abs(s.mean() - width**2 / 2) > 3 * error
-    assert abs(s.mean()) > 3 * error
-
-
 def test_the_unbiased_mean_is_the_generating_function_at_minus_a_half() -> None:
     k = cumulants(load("moving-cap"), 0, 8, q=-0.5)[0]
     found = float(unbiased_mean(load("moving-cap"), 8))

@@ -28,7 +28,7 @@ from scene import Cap, Fourier, Horizon, Mushroom, State, Stem
 from scene.laws import bounds, values
 from scene.sizes import size_bounds
 
-N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "100"))
+N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "50"))
 
 
 def attack(name, n_cases, seed):

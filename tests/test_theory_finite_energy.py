@@ -64,7 +64,7 @@ def test_the_diffusion_that_keeps_the_measure_de_has_this_blur() -> None:
 
 def phase_volume_gap(name: str, energy: float, width: float = 0.3) -> float:
     """Return how far particles of all energies, uniform in phase space, end from uniform near an energy."""
-    y, step = math.log(energy), 0.1
+    y, step = math.log(energy), 0.25  # the bump is 0.3 wide: what sums leave is below 1e-12
     total = 0.0
     for x in np.arange(y - 3.2, y + 2.6, step):
         f = FiniteEnergy(load(name), math.exp(x))
@@ -208,8 +208,8 @@ def test_kicks_are_remembered_as_their_correlations_say(steps: float, turning: f
     kicks[2] = size
     found = fields._remembered(kicks, speed, np.full(N_TIMES, turning * steps))
     fine = np.repeat(size, 4)
-    apart = np.abs(np.subtract.outer(np.arange(4 * N_TIMES), np.arange(4 * N_TIMES))) / 4 * steps
-    truth = fine @ (np.exp(-(1 + turning) * apart) * steps / 2) @ fine / 16
+    apart = np.abs(np.arange(1 - fine.size, fine.size)) / 4 * steps
+    truth = np.correlate(fine, fine, "full") @ np.exp(-(1 + turning) * apart) * steps / 2 / 16
     if steps > 1:
         truth = (size**2).sum() / (1 + turning)
     assert found.sum() == pytest.approx(truth, rel=0.01)

@@ -18,7 +18,7 @@ from support.refusals import one_line
 import scene
 from conformance.strategies import laws
 from scene import BangBang, Cap, Fourier, Law, Stem
-from scene.exact import Sturm, add, at, multiply, negative_point, root_bound, scale, trimmed, vanishes
+from scene.exact import Sturm, add, at, multiply, negative_point, root_bound, scale, vanishes
 from scene.laws import (
     LEAST_NORMAL,
     Bounds,
@@ -369,9 +369,6 @@ def test_a_law_that_stands_still_has_exact_bounds():
 
 
 rationals = st.fractions(-4, 4, max_denominator=16)
-# x^2 + c has no real root for c > 0 and two irrational ones for most c < 0.
-quadratics = rationals.map(lambda c: trimmed([c, Fraction(0), Fraction(1)]))
-intervals = st.tuples(rationals, rationals).filter(lambda ends: ends[0] < ends[1])
 
 
 def product(factors, start=(Fraction(1),)):
@@ -407,18 +404,6 @@ def test_planted_roots_are_counted(case, data):
     if point is not None:
         assert a <= point <= b
         assert at(p, point) < 0
-
-
-@pytest.mark.deep
-@given(st.lists(quadratics, min_size=1, max_size=3), intervals)
-def test_double_irrational_roots_are_no_change_of_sign(factors, ends):
-    a, b = ends
-    square = product([f for factor in factors for f in (factor, factor)])
-    assert negative_point(square, a, b) is None
-    # Lowered by any amount it dips below zero exactly where it vanished before.
-    lowered = add(square, [Fraction(-1, 10**30)])
-    if vanishes(square, a, b):
-        assert negative_point(lowered, a, b) is not None
 
 
 def test_a_dip_narrower_than_any_sampling_is_found():

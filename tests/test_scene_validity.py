@@ -25,9 +25,7 @@ from scene import (
     from_data,
     load,
     mixed,
-    tables,
     to_data,
-    validity,
 )
 from scene.exact import leg_intervals
 from scene.geometry import area, rounded, table_at
@@ -390,32 +388,3 @@ def test_points_of_the_stem_are_uniform_in_its_area(scene):
     x, depth = now.uniform_in_stem(a, b)
     assert depth * (2 * now.w - now.slope * depth) == pytest.approx(a * now.stem_area())
     assert x / now.half_width(-depth) == pytest.approx(2 * b - 1)
-
-
-def refusals():
-    """Refuse caps, mouths and stems of every size, and of legs that begin far from 0."""
-    found = []
-    for size, omega in itertools.product((2.0**-500, 1.0, 2.0**500), (2.0**-300, 1.0, 2.0**20)):
-        r = Fourier(mean=size, omega=omega, cos=(0.1 * size,), sin=(0.0, 0.9 * size, 0.6 * size))
-        h = Fourier(mean=1.5 * size, omega=omega, cos=(0.0, 0.2 * size), sin=(0.3 * size,))
-        found += [(Cap, {"r": r}), (Stem, {"w": h, "h": h, "slope": replace(wave(1.0, 0.1), omega=omega)})]
-    for start, length in itertools.product((0.0, -7.25, 2.0**17, 2.0**19, 2.0**40), (1.0, 2.0**-30)):
-        knots = [(start * length + length * k / 4, v) for k, v in enumerate((0.5, 0.9, 1.25, 0.75, 0.5))]
-        found += [(mushroom, {"nu": BangBang(knots)}), (mushroom, {"nu": None, "w": BangBang(knots)})]
-    return found
-
-
-@pytest.mark.deep
-def test_floats_find_the_same_instant_to_show(monkeypatch):
-    def messages():
-        tables._prove.cache_clear()
-        shown = []
-        for make, found in refusals():
-            with pytest.raises(InvalidScene) as refusal:
-                make(**found)
-            shown.append(str(refusal.value))
-        return shown
-
-    quick = messages()
-    monkeypatch.setattr(validity, "_least", lambda condition, start, span, n: range(n))
-    assert messages() == quick

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import mpmath
@@ -21,7 +20,6 @@ from theory import (
     adiabatic,
     mean_of,
     predict,
-    prediction,
     v_cap,
     v_cha,
 )
@@ -297,18 +295,6 @@ def test_strings_have_the_digits_asked() -> None:
     assert strings["log_e_nc"] == "-0.42246543129115702037"
     assert found.strings(1)["mean_exp_plus"] == "1"
     assert found.sd_of_mean(4) == found.sd / 2
-
-
-def test_threads_at_different_digits_do_not_disturb_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prediction, "FEW_DIGITS", 0)  # each computes
-    before = mpmath.mp.prec
-    scene = load("fixed-cap-clockwise")
-    alone = [predict(scene, digits).strings(digits) for digits in (12, 25)]
-    with ThreadPoolExecutor(2) as pool:
-        jobs = [pool.submit(lambda d: predict(scene, d).strings(d), digits) for digits in (12, 25, 12, 25)]
-        together = [job.result() for job in jobs]
-    assert together == alone + alone
-    assert mpmath.mp.prec == before
 
 
 def test_knots_may_start_anywhere_in_the_period() -> None:

@@ -37,7 +37,7 @@ LONGEST = [
     "test_fast_bits.py",
     "test_fast_faulty_kernels.py",
     "test_theory_prediction.py",
-    "test_theory_valleys.py",
+    "test_theory_cycle.py",
     "test_mushrooms_audit.py",
     "test_mushrooms_main.py",
     "test_mushrooms_store.py",

@@ -5,8 +5,6 @@ What long comparisons counted is printed after the tests: nothing is skipped sil
 Workers take whole files, the long ones first, and do not compile what another worker is compiling.
 """
 
-from __future__ import annotations
-
 import fcntl
 import gc
 import json
@@ -39,7 +37,7 @@ LONGEST = [
     "test_fast_bits.py",
     "test_fast_faulty_kernels.py",
     "test_theory_prediction.py",
-    "test_theory_valleys.py",
+    "test_theory_cycle.py",
     "test_mushrooms_audit.py",
     "test_mushrooms_main.py",
     "test_mushrooms_store.py",
@@ -59,7 +57,6 @@ LONGEST = [
     "test_conformance_properties.py",
     "test_theory_distribution.py",
     "test_conformance_bench.py",
-    "test_theory_large_deviations.py",
     "test_fast_ensemble.py",
 ]
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from support import faulty_references as faults
-from support.depth import deep_but
+from support.depth import deep_among, deep_but
 from support.refusals import assert_refused
 from support.schemas import validator
 from support.tables import LIFT
@@ -74,6 +74,7 @@ KILLS = [
     ("anywhere", faults.reduced_time, 20),
     ("slow-towards-waves", faults.impatient, 10),
 ]
+SLOW = [kill for kill in KILLS if kill[1] is faults.swept_begins_alone]  # test_reference_mutants, too
 USUAL = sorted({"growing-stem", "steep", *(name for name, _, _ in KILLS)})
 
 
@@ -90,8 +91,9 @@ def test_our_steppers_survive(name, tally):
     assert all(len(cases) == found.counts[kind] for kind, cases in found.cases.items())
 
 
-@pytest.mark.parametrize(("name", "fault", "n_cases"), KILLS)
-def test_a_family_finds_its_fault(name, fault, n_cases, monkeypatch):
+@pytest.mark.parametrize("kill", deep_among(KILLS, *SLOW))
+def test_a_family_finds_its_fault(kill, monkeypatch):
+    name, fault, n_cases = kill
     fault(monkeypatch)
     attacks = (FAMILIES[name].question(f"{SEED}/{index}") for index in range(n_cases))
     assert any(confirmed(attack).kind == "wrong" for attack in attacks)

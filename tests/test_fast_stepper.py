@@ -354,7 +354,7 @@ def test_threads_may_ask_side_by_side():
             assert found == expected
 
 
-N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "100"))
+N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "50"))
 
 
 def attack(name, n_cases, seed):

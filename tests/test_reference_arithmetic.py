@@ -1,7 +1,5 @@
 """Only sound interval operations: each encloses, and no other may be used."""
 
-from __future__ import annotations
-
 import ast
 import operator
 from fractions import Fraction

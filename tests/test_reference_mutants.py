@@ -4,8 +4,6 @@ Nothing here compares the reference with its own earlier results. Each faulty re
 Further answers: test_hard_cases.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import random
@@ -194,7 +192,7 @@ def starts_along_a_wall_that_rests():
 
     A constant law costs no work, so that only reasoning ends the search for a time at which f rises.
     """
-    draw, n_cuts, honest = random.Random(3), [0], Isolator._split
+    draw, n_cuts, honest = random.Random(24), [0], Isolator._split  # one path in a hundred begins so
 
     def watched(self, a, b):
         n_cuts[0] += 1
@@ -203,7 +201,7 @@ def starts_along_a_wall_that_rests():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Isolator, "_split", watched)
-        for _ in range(300):
+        for _ in range(100):
             place, speed = draw.uniform(0.1, 3.0), 10.0 ** draw.uniform(-1.0, 3.0)
             course = place + draw.choice((1.0, -1.0)) * draw.uniform(1.0, 1.5)
             vx, vy = -speed * math.cos(course), -speed * math.sin(course)

@@ -1,7 +1,5 @@
 """Bad input of the steppers' public entries: one line that names field, value and bound, and nothing else."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from random import Random

@@ -6,8 +6,6 @@ against `theory.at_energy`: each difference, less what `theory_error` allows, in
 make one test at LEVEL. `python tests/test_theory_simulated.py` does so at full size and prints each figure.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple

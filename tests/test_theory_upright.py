@@ -1,7 +1,5 @@
 """Upright stems: what the cap does to flights along the base, and the log(v) / v that comes of it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -89,7 +87,7 @@ def spread_over_the_mouth(narrow, pace):
 
     An integral over w, in which a leg that lasts for an instant and a narrow mouth are like any other.
     """
-    edges = np.geomspace(narrow, 1.0, 100_001)
+    edges = np.geomspace(narrow, 1.0, 20_001)
     w, dw = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
     v_cha = 2 * math.pi * (np.arcsin(w) + w * np.sqrt(1 - w * w) + 2 * w)
     gain = 4 * math.pi * dw / v_cha  # of log E, while the stem loses dw

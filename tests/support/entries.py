@@ -1,7 +1,5 @@
 """The compiled functions that are kept in numba's disk cache."""
 
-from __future__ import annotations
-
 from numba.core.dispatcher import Dispatcher
 
 from fast import batch

@@ -1,7 +1,5 @@
 """Kernels are compiled for compiled callers; this is one that Python can call."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any

@@ -16,7 +16,7 @@ from numba import njit
 
 PERIOD = 2 * pi
 ENERGY = 1e4
-N_WRONG_SIGN = 8.0  # of a wall's speed: hits that are slower keep the right sign, or they would stick to it
+N_WRONG_SIGN = 30.0  # of a wall's speed: hits that are slower keep the right sign, or they stay near it
 
 
 @njit

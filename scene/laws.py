@@ -21,9 +21,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from scene.given import MAX_KNOTS, amplitudes, check_legs, checked_knot, finite_times
-from scene.refusal import InvalidScene, check_number, listed, shown
+from scene.refusal import BadInput, InvalidScene, check_number, listed, shown
 
+MAX_HARMONICS = 16  # validity is decided by exact algebra, whose cost grows steeply with the degree
+MAX_KNOTS = 256
 LEAST_NORMAL = 2.0**-1022
 
 FloatArray = NDArray[np.float64]
@@ -102,6 +103,55 @@ class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", f
 
 
 Law = float | Fourier | BangBang
+
+
+def amplitudes(field: str, numbers: object) -> tuple[float, ...]:
+    """Return a Fourier law's amplitudes.
+
+    Raises:
+        InvalidScene: they are not a list of finite numbers, or too many.
+    """
+    numbers = listed(numbers)
+    if not isinstance(numbers, tuple | list):
+        raise InvalidScene(f"{field} = {shown(numbers)}, must be a list of numbers")
+    if len(numbers) > MAX_HARMONICS:
+        raise InvalidScene(f"{field} has {len(numbers)} harmonics, at most {MAX_HARMONICS} are allowed")
+    return tuple(check_number(f"{field}[{k}]", number, InvalidScene) for k, number in enumerate(numbers))
+
+
+def checked_knot(i: int, knot: object) -> tuple[float, float]:
+    """Return a bang-bang law's knot number i.
+
+    Raises:
+        InvalidScene: it is not a pair of finite numbers.
+    """
+    knot = listed(knot)
+    if not (isinstance(knot, tuple | list) and len(knot) == 2):
+        raise InvalidScene(f"bang-bang.knots[{i}] = {shown(knot)}, must be a pair [time, value]")
+    time, value = knot
+    return (
+        check_number(f"bang-bang.knots[{i}] time", time, InvalidScene),
+        check_number(f"bang-bang.knots[{i}] value", value, InvalidScene),
+    )
+
+
+def check_legs(knots: tuple[tuple[float, float], ...]) -> None:
+    """Refuse knots whose times do not increase, that do not close, or whose span is not a binary64 number.
+
+    Raises:
+        InvalidScene: naming the knot, the value and the bound.
+    """
+    for i, ((before, _), (after, _)) in enumerate(itertools.pairwise(knots), 1):
+        if after <= before:
+            raise InvalidScene(f"bang-bang.knots[{i}] time = {after}, must be > {before}")
+    (start, first), (end, last) = knots[0], knots[-1]
+    if last != first:
+        raise InvalidScene(
+            f"bang-bang.knots[{len(knots) - 1}] value = {last}, must equal the first ({first}): no jumps"
+        )
+    span = end - start
+    if not math.isfinite(span) or Fraction(span) != Fraction(end) - Fraction(start):
+        raise InvalidScene(f"bang-bang.knots span {start} to {end}: the period must be a binary64 number")
 
 
 def _keep(law: msgspec.Struct, field: str, value: Any) -> None:
@@ -332,6 +382,21 @@ def at(law: Law, t: Any) -> Any:
     return found if times.ndim else float(found)
 
 
+def finite_times(t: object) -> FloatArray:
+    """Return times as an array.
+
+    Raises:
+        BadInput: a time is not a finite number.
+    """
+    try:
+        times = np.asarray(t, np.float64)
+    except (TypeError, ValueError):
+        raise BadInput(f"t = {shown(t)}, must be finite numbers") from None
+    if not np.isfinite(times).all():
+        raise BadInput(f"t = {times[~np.isfinite(times)][0]}, must be finite")
+    return times
+
+
 def bounds(law: Law) -> Bounds:
     """Bound a law and its derivatives for all times, rounded outward at every scale.
 
@@ -392,3 +457,34 @@ def _up(size: float, exponent: int) -> float:
 
 def _slack(level: float, swing: float) -> float:
     return (abs(level) + swing) * 2.0**-50
+
+
+def size_bounds(law: Law) -> Bounds:
+    """Bound a law that is a size (radius, width, depth or nu), positive because its scene is valid.
+
+    `bounds` subtracts all amplitudes of a Fourier law from its mean. The result may be negative although the
+    law is not: 1 + 0.9 cos x - 0.35 cos 3x is above 0.1. Here the least value is never below 0; a lower bound
+    of 0 only says that the law is positive.
+    """
+    found = bounds(law)
+    if found.lowest > 0.0 or not isinstance(law, Fourier):
+        return found
+    return found._replace(lowest=_least_by_samples(law))
+
+
+def _least_by_samples(law: Fourier) -> float:
+    """Bound a positive Fourier law from below by samples; return 0 if they do not show a positive bound.
+
+    Between samples at distance d, f is at least the lower neighbour minus max |f''| d^2 / 8. Units are the
+    mean, which is positive, and the phase.
+    """
+    waves = [(k, c / law.mean, s / law.mean) for k, c, s in law.harmonics()]
+    size = 1.0 + sum(k * (abs(c) + abs(s)) for k, c, s in waves)  # bounds what a rounded phase does, too
+    bend = sum(k * k * (abs(c) + abs(s)) for k, c, s in waves)
+    for n in (2**8, 2**11, 2**14, 2**17):
+        phases = np.arange(n) * (2.0 * np.pi / n)
+        least = float((1.0 + sum(c * np.cos(k * phases) + s * np.sin(k * phases) for k, c, s in waves)).min())
+        found = least - bend * (2.0 * np.pi / n) ** 2 / 8.0 - 2.0**-40 * size
+        if found > 0.5 * least:
+            return found * law.mean
+    return 0.0

@@ -20,8 +20,7 @@ from conformance.cases.table import FAMILIES
 from conformance.plain import Flight, next_collision
 from conformance.strategies import adversarial, laws, scenes_and_states, states
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, check_scene, from_data, load
-from scene.laws import bounds, is_constant, values
-from scene.sizes import size_bounds
+from scene.laws import bounds, is_constant, size_bounds, values
 from scene.states import check_numbers
 from scene.tables import laws as laws_of
 

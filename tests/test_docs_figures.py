@@ -29,8 +29,7 @@ from mushrooms.store import conduct
 from mushrooms.store.spec import FIELDS, RunSpec, Shape, shape_of
 from reference.arithmetic import MAX_WORK
 from scene import from_data, load
-from scene.given import MAX_HARMONICS, MAX_KNOTS
-from scene.laws import value
+from scene.laws import MAX_HARMONICS, MAX_KNOTS, value
 from theory.large_deviations import loss_probability
 
 ROOT = Path(__file__).parent.parent

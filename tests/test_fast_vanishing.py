@@ -25,8 +25,7 @@ from fast import pieces, units
 from fast.batch import lane_steps
 from fast.units import compile_scene
 from scene import Cap, Fourier, Horizon, Mushroom, State, Stem
-from scene.laws import bounds, values
-from scene.sizes import size_bounds
+from scene.laws import bounds, size_bounds, values
 
 N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "100"))
 

@@ -34,8 +34,7 @@ from conformance.cases.scenes import (
 )
 from scene import Cap, Law, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded
-from scene.given import MAX_KNOTS
-from scene.laws import bounds, is_constant
+from scene.laws import MAX_KNOTS, bounds, is_constant
 from scene.transforms import scaled, scaled_law, scaled_state
 
 WALLS: tuple[tuple[str, Wall], ...] = tuple(

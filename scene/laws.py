@@ -173,11 +173,10 @@ class Period(NamedTuple):
 
 
 class Quadratic(NamedTuple):
-    """c0 + c1 (t - origin) + c2 (t - origin)^2 until `end`, all exact rationals."""
+    """c0 + c2 (t - origin)^2 until `end`, all exact rationals: a bang-bang law rests at its knots."""
 
     origin: Fraction
     c0: Fraction
-    c1: Fraction
     c2: Fraction
     end: Fraction
 
@@ -242,8 +241,8 @@ def half_legs(law: BangBang) -> tuple[Quadratic, ...]:
     for knot, next_knot in itertools.pairwise(law.knots):
         (start, before), (stop, after) = map(Fraction, knot), map(Fraction, next_knot)
         half_acceleration = 2 * (after - before) / (stop - start) ** 2
-        found.append(Quadratic(start, before, Fraction(0), half_acceleration, (start + stop) / 2))
-        found.append(Quadratic(stop, after, Fraction(0), -half_acceleration, stop))
+        found.append(Quadratic(start, before, half_acceleration, (start + stop) / 2))
+        found.append(Quadratic(stop, after, -half_acceleration, stop))
     return tuple(found)
 
 
@@ -278,7 +277,7 @@ def _at_float(piece: Quadratic, t: float | FloatArray, order: int) -> Any:
     if isinstance(t, np.ndarray):
         return np.array([_at_float(piece, each, order) for each in t.ravel().tolist()]).reshape(t.shape)
     x = Fraction(t) - piece.origin
-    found = (piece.c0 + x * (piece.c1 + x * piece.c2), piece.c1 + 2 * piece.c2 * x, 2 * piece.c2)
+    found = (piece.c0 + piece.c2 * x**2, 2 * piece.c2 * x, 2 * piece.c2)
     return exact(_Arrays, found[order])
 
 
@@ -300,8 +299,8 @@ def evaluate(ctx: Any, piece: Piece, t: Any, order: int = 0) -> Any:
         if ctx.mpf is float and math.isinf(c2):
             return _at_float(piece, t, order)
         if order == 0:
-            return exact(ctx, piece.c0) + x * (exact(ctx, piece.c1) + x * c2)
-        return exact(ctx, piece.c1) + 2 * c2 * x if order == 1 else 2 * c2
+            return exact(ctx, piece.c0) + x * (x * c2)
+        return 2 * c2 * x + 0 if order == 1 else 2 * c2  # + 0: what rests has the rate 0, not minus 0
     if isinstance(piece, Fourier):
         return _trigonometric(ctx, piece, t, order)
     return ctx.mpf(piece) if order == 0 else ctx.mpf(0)
@@ -336,12 +335,7 @@ def value(ctx: Any, law: Law, t: Any, order: int = 0) -> Any:
     if isinstance(t, np.ndarray):
         return values(law, t, order)
     if isinstance(law, BangBang):
-        # A Python float passes through as it is; an mpf becomes the exact rational it stands for.
-        time = (
-            Fraction(t)
-            if isinstance(t, (int, float, Fraction))
-            else Fraction(*map(int, t.as_integer_ratio()))
-        )
+        time = Fraction(*map(int, t.as_integer_ratio()))  # of mpf the parts are integers of gmpy2
         return evaluate(ctx, piece_at(law, time), t, order)
     return evaluate(ctx, law, t, order)
 

@@ -107,15 +107,14 @@ def _mouth(system: Any, pieces: tuple[Piece, Piece]) -> Callable[[Any], tuple[An
 
 def _parameter(system: Any, piece: Piece) -> Parameter:
     if isinstance(piece, Quadratic):
-        origin, c0, c1, c2 = (exact(system, number) for number in piece[:4])
-
+        origin, c0, c2 = (exact(system, number) for number in piece[:3])
         twice = 2 * c2
 
         def value(t: Any, _: Any) -> Any:
             x = t - origin
-            return c0 + x * (c1 + x * c2)
+            return c0 + x * (x * c2)
 
-        return Parameter(value, lambda t, _: c1 + (t - origin) * twice)
+        return Parameter(value, lambda t, _: (t - origin) * twice)
     if isinstance(piece, Fourier):
         return _wave(system, piece)
     constant, zero = system.mpf(piece), system.zero

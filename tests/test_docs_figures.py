@@ -30,7 +30,7 @@ from mushrooms.store.spec import FIELDS, RunSpec, Shape, shape_of
 from reference.arithmetic import MAX_WORK
 from scene import from_data, load
 from scene.laws import MAX_HARMONICS, MAX_KNOTS, value
-from theory.large_deviations import loss_probability
+from theory.distribution import loss_probability
 
 ROOT = Path(__file__).parent.parent
 BENCH = json.loads((ROOT / "docs" / "bench" / "bench.json").read_bytes())

@@ -10,7 +10,7 @@ from support.saddle import Saddle
 
 import theory
 from scene import load
-from theory.large_deviations import loss_probability, rarity
+from theory.distribution import loss_probability, rarity
 
 PAIRS = (
     pytest.param("moving-cap", "moving-cap-reversed", marks=pytest.mark.deep),

@@ -2,7 +2,7 @@
 
 `volumes` has the formulas for volumes of phase space. `cycle` computes when particles are captured and
 released, `adiabatic` how their energy changes, and `prediction` the figures of one cycle. `curves`, `density`
-and `distribution` describe energies after one cycle, `large_deviations` after many cycles. `finite_energy`
+and `distribution` describe energies after one cycle, `distribution` after many cycles too. `finite_energy`
 goes beyond the paper.
 """
 
@@ -18,7 +18,16 @@ from theory.curves import (
 )
 from theory.cycle import Cycle
 from theory.density import Caustic, capture_rate_at, caustics, cdf_at, density_at
-from theory.distribution import Energies, Sum, energies, energy_cdf, sum_of_cycles
+from theory.distribution import (
+    Energies,
+    Rarity,
+    Sum,
+    energies,
+    energy_cdf,
+    loss_probability,
+    rarity,
+    sum_of_cycles,
+)
 from theory.finite_energy.fits import (
     Limit,
     PowerFit,
@@ -29,7 +38,6 @@ from theory.finite_energy.fits import (
 from theory.finite_energy.one_cycle import FiniteEnergy, at_energy
 from theory.finite_energy.rates import Rates, frozen_rates
 from theory.finite_energy.upright import is_upright, kept_by_the_cap, upright_rate, upright_spread
-from theory.large_deviations import Rarity, loss_probability, rarity
 from theory.prediction import Prediction, cumulants, mean_of, moments, predict, reversed_cycle
 from theory.volumes import (
     NotCovered,

@@ -11,9 +11,17 @@ from support.depth import deep_among, deep_but
 
 import theory
 from scene import load
-from theory.finite_energy.coefficients import N_TIMES, Fields
 from theory.finite_energy.one_cycle import FiniteEnergy, PointMasses, _joined, at_energy, kernel_cdf
-from theory.finite_energy.rates import MEMORIES, PHASES, SPEEDS, frozen_rates, kick_rates, rates_at
+from theory.finite_energy.rates import (
+    MEMORIES,
+    N_TIMES,
+    PHASES,
+    SPEEDS,
+    Fields,
+    frozen_rates,
+    kick_rates,
+    rates_at,
+)
 
 CYCLES = (
     "fixed-cap-anticlockwise",

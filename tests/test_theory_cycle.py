@@ -18,7 +18,7 @@ from scene import BangBang, Fourier, Mushroom, load
 from scene.laws import value
 from theory import Cycle
 from theory.critical import solve_rising, spans
-from theory.parameters import MovingMushroom
+from theory.cycle import MovingMushroom
 
 
 def test_moving_cap_releases_at_two_pi_minus_t() -> None:

@@ -13,7 +13,7 @@ from support.refusals import one_line
 import theory
 from scene import BangBang, Cap, Fourier, Mushroom, Stem, load
 from scene.transforms import scaled
-from theory.validation import MAX_DIGITS, MAX_ORDER
+from theory.precision import MAX_DIGITS, MAX_ORDER
 
 SCENE = load("moving-cap")
 FP = mpmath.fp

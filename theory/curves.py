@@ -20,8 +20,7 @@ from scene.tables import Scene
 from theory.branches import DIGITS, Branch, Floats, X, at, tree, turns
 from theory.cycle import Cycle
 from theory.distribution import energies
-from theory.precision import guarded
-from theory.validation import finite_array
+from theory.precision import finite_array, guarded
 from theory.volumes import in_near_units, volumes_at
 
 MAX_POINTS = 10_000_000

@@ -29,9 +29,8 @@ from theory.adiabatic import Captures
 from theory.branches import UNRESOLVED, Branch, Floats, Node, X, at, noise, tree
 from theory.chebyshev import product
 from theory.critical import solve_rising
-from theory.precision import guarded
+from theory.precision import finite_array, guarded
 from theory.prediction import converged
-from theory.validation import finite_array
 
 STEP = 2.0**-12  # the lattice's, at best, and as a share of one cycle's reach
 LEAST_REACH = 1e-12  # of s in a cycle; below, its differences are partly rounding

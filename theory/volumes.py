@@ -19,7 +19,7 @@ from scene.laws import Law, value
 from scene.refusal import BadInput, check_number, shown
 from scene.tables import Mushroom, Scene, check_scene
 from scene.transforms import scaled
-from theory.validation import check_real, in_system
+from theory.precision import check_real, in_system
 
 FAR = 100  # powers of two of a length or a time, beyond which others are taken for units
 WIDE = 0.75  # nu from which the island's share is summed as a series

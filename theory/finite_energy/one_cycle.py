@@ -1,7 +1,7 @@
 """Energies after one cycle at finite energy: the adiabatic theory with diffusion and shifts, nothing fitted.
 
 The chaotic zone's log E diffuses by the kicks of its walls, and the particles about to be captured, like
-those just released, lag behind the zone's mean. Both are known from frozen tables (`coefficients`). Beside
+those just released, lag behind the zone's mean. Both are known from frozen tables (`rates`). Beside
 its gain over the uncaptured a particle has a shift and a variance, of the orders v^-1 to v^(-2/3) and v^-1.
 Diffusion alone is exact: E^(1/4) is the distance from 0 of a Brownian motion in four dimensions, which
 is what keeping phase volume leaves of it. theory/equations.md derives all this and says what is left out.
@@ -21,9 +21,8 @@ from scene.refusal import BadInput, check_count, check_number
 from scene.tables import Mushroom, Scene
 from theory.branches import Branch, Floats, Node, at, tree
 from theory.curves import chaotic_zone
-from theory.finite_energy.coefficients import N_TIMES, Fields, Flags, cycle_coefficients
-from theory.finite_energy.rates import SPEEDS, table_error
-from theory.validation import finite_array
+from theory.finite_energy.rates import N_TIMES, SPEEDS, Fields, Flags, cycle_coefficients, table_error
+from theory.precision import finite_array
 from theory.volumes import NotCovered, as_mushroom
 
 N_PLACES = 2000  # at which distribution functions are computed; linear between them

@@ -1,19 +1,18 @@
 """The paper's closed forms and quadratures, at any precision.
 
 `volumes` has the formulas for volumes of phase space. `cycle` computes when particles are captured and
-released, `adiabatic` how their energy changes, and `prediction` the figures of one cycle. `curves`, `density`
-and `distribution` describe energies after one cycle, `distribution` after many cycles too. `finite_energy`
-goes beyond the paper.
+released, `adiabatic` how their energy changes, and `prediction` the figures of one cycle. `branches` has its
+curves, `density` and `distribution` the energies after one cycle, `distribution` those after many cycles too.
+`finite_energy` goes beyond the paper.
 """
 
 from theory.adiabatic import NotConverged
-from theory.curves import (
+from theory.branches import (
     CaptureCurve,
     ChaoticZone,
     capture_curve,
     capture_time_mass,
     chaotic_zone,
-    energy_density,
     largest_gain,
 )
 from theory.cycle import Cycle
@@ -24,6 +23,7 @@ from theory.distribution import (
     Sum,
     energies,
     energy_cdf,
+    energy_density,
     loss_probability,
     rarity,
     sum_of_cycles,

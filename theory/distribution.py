@@ -26,7 +26,7 @@ from scipy.optimize import brentq
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Scene
 from theory.adiabatic import Captures
-from theory.branches import UNRESOLVED, Branch, Floats, Node, X, at, noise, tree
+from theory.branches import UNRESOLVED, Branch, Floats, Node, X, at, noise, rising_edges, tree
 from theory.chebyshev import product
 from theory.critical import solve_rising
 from theory.precision import finite_array, guarded
@@ -106,6 +106,27 @@ def energy_cdf(found: Energies | Scene, s: ArrayLike) -> Floats:
     """
     levels = finite_array("s", s)
     return energies(found).cdf(levels.ravel()).reshape(levels.shape)
+
+
+def energy_density(scene: Scene, edges: ArrayLike) -> Floats:
+    """Return the probability of being captured and ending with log E1 / E0 in each bin.
+
+    Args:
+        scene: as for `theory.predict`.
+        edges: bin edges, rising, at least two; a histogram's.
+
+    Returns:
+        Probabilities, one per bin. Over all s they add up to 1 - p_nc: particles never captured do
+        not count.
+
+    Raises:
+        BadInput: edges do not rise.
+        NotCovered, NotConverged: as `theory.predict`.
+
+    Source: Eq:lnE/E0 with Eq:ps.
+    """
+    bounds = rising_edges(edges)
+    return np.diff(energies(scene).captured_below(bounds))
 
 
 class Lattice:

@@ -19,8 +19,7 @@ from scipy.special import ndtr
 
 from scene.refusal import BadInput, check_count, check_number
 from scene.tables import Mushroom, Scene
-from theory.branches import Branch, Floats, Node, at, tree
-from theory.curves import chaotic_zone
+from theory.branches import Branch, Floats, Node, at, chaotic_zone, tree
 from theory.finite_energy.rates import N_TIMES, SPEEDS, Fields, Flags, cycle_coefficients, table_error
 from theory.precision import finite_array
 from theory.volumes import NotCovered, as_mushroom

@@ -29,8 +29,7 @@ from scene.geometry import table_at
 from scene.laws import BangBang, breakpoints, values
 from scene.tables import Mushroom, Scene, laws
 from scene.transforms import backwards
-from theory.branches import Floats, tree
-from theory.curves import chaotic_zone
+from theory.branches import Floats, chaotic_zone, tree
 from theory.cycle import Cycle
 from theory.volumes import NotCovered, as_mushroom, delta_slope, volumes_at
 

@@ -21,8 +21,7 @@ from scene.laws import breakpoints, is_constant, value
 from scene.refusal import BadInput, check_number
 from scene.tables import Scene, laws
 from theory.adiabatic import NotConverged
-from theory.branches import DIGITS, Floats
-from theory.curves import chaotic_zone
+from theory.branches import DIGITS, Floats, chaotic_zone
 from theory.cycle import Cycle
 from theory.finite_energy.rates import kick_rates
 from theory.precision import finite_array

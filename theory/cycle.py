@@ -13,8 +13,7 @@ value counts as none.
 
 Parameters are the same functions of time as `scene.laws.evaluate` gives, in gmpy2's numbers, ten times as
 fast as mpmath's, with one sine and cosine for all laws and harmonics: a cycle inverts nu(t) and takes volumes
-thousands of times. It is inverted in closed form where parameters are parabolas, else from a solution in
-binary64.
+thousands of thousands of times. It is inverted in binary64 first.
 """
 
 from __future__ import annotations
@@ -22,18 +21,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise, zip_longest
+from itertools import pairwise
 from math import lcm
 from typing import Any, NamedTuple
 
 from mpmath import MPContext, fp
 
-from scene.exact import leg_polynomial
-from scene.laws import Fourier, Law, Piece, Quadratic, exact, frequency, piece_at
+from scene.laws import Fourier, Piece, Quadratic, exact, frequency, piece_at
 from scene.mouth import mouth_factors
 from scene.refusal import BadInput, check_count
 from scene.tables import Mushroom, Scene, laws, period
-from theory.critical import Span, quadratic_roots, solve_rising, spans
+from theory.critical import Span, solve_rising, spans
 from theory.precision import MAX_DIGITS, Binary, guarded, one_of, settle
 from theory.volumes import NotCovered, as_mushroom
 
@@ -362,8 +360,8 @@ class Parameter(NamedTuple):
     rate: Callable[[Any, Any], Any]
 
 
-# From nu and a bracket to the time in it at which the mouth is nu, about; None where none is found.
-Inverse = Callable[[Any, Any, Any], Any]
+# Returns a number and its rate at a time.
+Motion = Callable[[Any], tuple[Any, Any]]
 
 
 class MovingMushroom:
@@ -377,18 +375,13 @@ class MovingMushroom:
     def __init__(self, ctx: Any, scene: Mushroom, time: Fraction) -> None:
         self.ctx, self.binary = ctx, Binary(ctx)
         pieces = {name: piece_at(law, time) for name, law in laws(scene).items()}
-        mouth = (pieces["nu"], 1.0) if "nu" in pieces else (pieces["w"], pieces["r"])
-        self._is_wavy = any(isinstance(piece, Fourier) for piece in mouth)
+        width, radius = (piece_at(law, time) for law in mouth_factors(scene))
         with self.binary.working():
             self._turn = _turning(self.binary, pieces.values())
             self._parameters = {name: _parameter(self.binary, piece) for name, piece in pieces.items()}
             self._half, self._4_by_pi = self.binary.one / 2, 4 / self.binary.pi
-            self.mouth = _mouth(self.binary, mouth)
-            self._near: Inverse = (
-                _inverse_of_waves(self.binary, mouth)
-                if self._is_wavy
-                else _inverse_of_parabolas(self.binary, *mouth_factors(scene), time)
-            )
+            self.mouth = _mouth(self.binary, (width, radius))
+        self._rough_mouth = _mouth(fp, (width, radius))
 
     def nu(self, t: Any) -> tuple[Any, Any]:
         """Return the mouth w / r at time t, and its rate. Source: Eq:nu, eq:dnu."""
@@ -405,16 +398,17 @@ class MovingMushroom:
 
     def time(self, nu: Any, low: Any, high: Any, is_falling: bool) -> Any:
         """Return the time in [low, high] at which a mouth that falls, or rises, is nu; in binary numbers."""
-        near = self._near(nu, low, high)
-        if near is not None and not self._is_wavy:
-            return near
         sign = -1 if is_falling else 1
 
-        def rising(t: Any) -> tuple[Any, Any]:
-            value, rate = self.mouth(t)
-            return sign * (value - nu), sign * rate
+        def rising(mouth: Motion, level: Any) -> Motion:
+            def excess(t: Any) -> tuple[Any, Any]:
+                value, rate = mouth(t)
+                return sign * (value - level), sign * rate
 
-        return solve_rising(self.binary, rising, low, high, near)
+            return excess
+
+        near = solve_rising(fp, rising(self._rough_mouth, float(nu)), float(low), float(high))
+        return solve_rising(self.binary, rising(self.mouth, nu), low, high, self.binary.mpf(near))
 
 
 def _turning(system: Any, pieces: Iterable[Piece]) -> Callable[[Any], Any]:
@@ -426,7 +420,7 @@ def _turning(system: Any, pieces: Iterable[Piece]) -> Callable[[Any], Any]:
     return lambda t: system.expj(omega * t)
 
 
-def _mouth(system: Any, pieces: tuple[Piece, Piece]) -> Callable[[Any], tuple[Any, Any]]:
+def _mouth(system: Any, pieces: tuple[Piece, Piece]) -> Motion:
     """Return w / r and its rate as a function of t, from the pieces of w and r."""
     turning, (width, radius) = _turning(system, pieces), (_parameter(system, piece) for piece in pieces)
 
@@ -470,32 +464,3 @@ def _wave(system: Any, law: Fourier) -> Parameter:
     return Parameter(
         lambda t, turn: law.mean + total(terms, turn).real, lambda t, turn: -omega * total(slopes, turn).imag
     )
-
-
-def _inverse_of_parabolas(binary: Binary, width: Law, radius: Law, time: Fraction) -> Inverse:
-    """Invert w / r of the parabolas or constants that two laws are near a time: a quadratic equation."""
-    powers = [[exact(binary, c) for c in leg_polynomial(law, time)] for law in (width, radius)]
-    pairs, base = list(zip_longest(*powers, fillvalue=binary.zero)), exact(binary, time)
-
-    def inverse(nu: Any, low: Any, high: Any) -> Any:
-        roots = quadratic_roots(binary, *[w - nu * r for w, r in pairs])
-        return next((base + root for root in roots if low < base + root < high), None)
-
-    return inverse
-
-
-def _inverse_of_waves(binary: Binary, pieces: tuple[Piece, Piece]) -> Inverse:
-    """Invert w / r of waves and constants in binary64."""
-    mouth = _mouth(fp, pieces)
-
-    def inverse(nu: Any, low: Any, high: Any) -> Any:
-        level, start, end = float(nu), float(low), float(high)
-        sign = 1.0 if mouth(start)[0] < mouth(end)[0] else -1.0
-
-        def rising(t: float) -> tuple[float, float]:
-            value, rate = mouth(t)
-            return sign * (value - level), sign * rate
-
-        return binary.mpf(solve_rising(fp, rising, start, end))
-
-    return inverse

@@ -26,7 +26,7 @@ from scipy.stats import ks_1samp
 
 import theory
 from conformance.audit.claim import Check
-from conformance.audit.claims.broadened import DRAWN_SEED, PEAK_DENSITY, Sums, peak_band
+from conformance.audit.claims.finite_energy import DRAWN_SEED, PEAK_DENSITY, Sums, peak_band
 from conformance.audit.runs import MAX_LOST, BoolArray, FloatArray
 from conformance.audit.tolerances import (
     N_SIGMA,

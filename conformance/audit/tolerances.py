@@ -13,6 +13,7 @@ power of the test against it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from decimal import Decimal
 from typing import Any, NamedTuple
 
 import mpmath
@@ -79,6 +80,11 @@ def spread(values: npt.ArrayLike) -> Mean:
     variance = float(np.mean(centred**2))
     fourth = float(np.mean(centred**4)) - variance**2
     return Mean(float(x.std(ddof=1)), float(np.sqrt(max(fourth, 0.0) / x.size / max(4 * variance, 1e-300))))
+
+
+def half_unit(printed: str) -> float:
+    """Return half a unit of the last printed digit."""
+    return 0.5 * 10.0 ** int(Decimal(printed).as_tuple().exponent)
 
 
 def close(

@@ -18,17 +18,21 @@ from scipy.stats import norm
 
 import theory
 from conformance.audit.claim import energies_of
-from conformance.audit.claims.broadened import (
+from conformance.audit.claims.exponents import nu_gap, zone_share
+from conformance.audit.claims.finite_energy import (
+    ACW,
+    CW,
     DRAWN_SEED,
+    ERGODIC,
+    LADDER,
     N_DRAWN,
     adiabatic_limit,
+    fitted,
     predicted,
     summed,
     width,
     zone_energy,
 )
-from conformance.audit.claims.exponents import nu_gap, zone_share
-from conformance.audit.claims.finite_energy import ACW, CW, ERGODIC, LADDER, fitted
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import Mean, mean, share

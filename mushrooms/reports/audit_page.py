@@ -17,7 +17,7 @@ from matplotlib import rc_context
 
 import scene as scenes
 from conformance.audit.claim import Check, Claim, Finding
-from conformance.audit.claims.broadened import adiabatic_limit, predicted
+from conformance.audit.claims.finite_energy import adiabatic_limit, predicted
 from conformance.audit.runs import Sample, run_seed, scene_of
 from conformance.audit.session import AuditResult
 from conformance.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, share, spread

@@ -8,8 +8,11 @@ import numpy as np
 from scipy.stats import ks_2samp, norm
 
 from conformance.audit.claim import Check, ClaimEvidence
-from conformance.audit.claims.broadened import (
+from conformance.audit.claims.finite_energy import (
+    ACW,
+    CW,
     ESCAPE,
+    FIXED,
     GROWTH,
     PEAK,
     adiabatic,
@@ -20,7 +23,6 @@ from conformance.audit.claims.broadened import (
     width,
     width_as_predicted,
 )
-from conformance.audit.claims.finite_energy import ACW, CW, FIXED
 from conformance.audit.claims.misprints import ZERO, loop_area
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import (

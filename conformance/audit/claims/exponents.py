@@ -16,15 +16,19 @@ from mpmath import fp
 
 import theory
 from conformance.audit.claim import Check, ClaimEvidence
-from conformance.audit.claims.broadened import (
+from conformance.audit.claims.experiments import chord_time
+from conformance.audit.claims.finite_energy import (
+    ACW,
+    ERGODIC,
+    FIXED,
+    LADDER,
     captured_change,
+    fitted,
     phase_times,
     predicted,
     share_in_the_zone,
     zone_energy,
 )
-from conformance.audit.claims.experiments import chord_time
-from conformance.audit.claims.finite_energy import ACW, ERGODIC, FIXED, LADDER, fitted
 from conformance.audit.runs import RUNS, Sample, run_seed, scene_of
 from conformance.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
 from scene import Scene, State, load

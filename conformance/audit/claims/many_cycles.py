@@ -13,7 +13,7 @@ from scipy.stats import chi2, ncx2, norm
 import theory
 from conformance import profiles
 from conformance.audit.claim import Check, ClaimEvidence, energies_of
-from conformance.audit.claims.broadened import (
+from conformance.audit.claims.finite_energy import (
     DRAWN_SEED,
     N_DRAWN,
     PEAK_DENSITY,

@@ -17,7 +17,6 @@ from matplotlib.figure import Figure
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claim import energies_of
 from conformance.audit.claims.exponents import nu_gap, zone_share
 from conformance.audit.claims.finite_energy import (
     ACW,
@@ -26,7 +25,6 @@ from conformance.audit.claims.finite_energy import (
     ERGODIC,
     LADDER,
     N_DRAWN,
-    adiabatic_limit,
     fitted,
     predicted,
     summed,
@@ -159,7 +157,7 @@ def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
     bars = gathered(sample.gain, float(found.peak[1] ** 0.5))
     draw(axes, rest, bars, found)
     axes.set_title(f"{sample.run.scene}, E0 = {power(sample.run.energy)}, {sample.n:,} particles")
-    draw_adiabatic(axes, energies_of(sample.run.name), bars.edges, "sharp")
+    draw_adiabatic(axes, theory.energies(scene_of(sample.run)), bars.edges, "sharp")
 
 
 def capture_times(*samples: Sample) -> Figure:
@@ -243,7 +241,7 @@ def stems(tilted: Sample, upright: Sample) -> Figure:
     outline: dict[str, Any] = {"color": BLUE, "fill": False, "linewidth": 1.5}
     for panel, scale in zip(axes, ("linear", "log"), strict=True):
         for sample, label, style in ((tilted, "tilted stem", {}), (upright, "upright stem", outline)):
-            kept = sample.gain[~sample.captured] - float(adiabatic_limit(sample.run).log_e_nc)
+            kept = sample.gain[~sample.captured] - float(theory.predict(scene_of(sample.run)).log_e_nc)
             _bars(panel, kept, edges, baseline=1e-3, label=label, **style)
         gaussian = norm.pdf(edges, sigma**2 / 4, sigma)
         panel.plot(edges, gaussian, color=GREEN, linewidth=1.2, label="Gaussian, tilted stem's width")

@@ -85,18 +85,19 @@ class RatesAt(NamedTuple):
     depletion: Floats
 
 
-def pace(scene: Scene, times: Floats) -> Floats:
-    """Return the root of the sum of squares of all parameters' rates at times (T,), as a scene names them.
+def pace(scene: Scene, times: Floats | float) -> Floats:
+    """Return the root of the sum of squares of all parameters' rates at times of any shape, as named.
 
     A mouth told as w has another pace than the same mouth told as nu. Rates are over the pace of the scene
     that was measured, so they are to be multiplied by no other: `RatesAt` has it.
     """
-    squares = np.array([values(law, times, 1) ** 2 for law in laws(scene).values()])
+    squares = np.array([values(law, np.asarray(times), 1) ** 2 for law in laws(scene).values()])
     return np.asarray(np.sqrt(squares.sum(axis=0)), dtype=np.float64)
 
 
-def kick_rates(scene: Scene, times: Floats) -> Floats:
-    """Return the chaotic zone's mean d log E / dt at times (T,). In Eq:dE the terms in d delta cancel."""
+def kick_rates(scene: Scene, times: Floats | float) -> Floats:
+    """Return the chaotic zone's mean d log E / dt at times. In Eq:dE the terms in d delta cancel."""
+    times = np.asarray(times, dtype=np.float64)
     now, volumes = table_at(fp, scene, times), volumes_at(np, scene, times)
     cap = 2 * np.pi**2 * now.r * now.r_rate
     widening = now.w_rate * now.h + now.w * now.h_rate - now.h * now.h_rate * now.slope

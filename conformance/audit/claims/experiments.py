@@ -24,7 +24,7 @@ from conformance.audit.claims.finite_energy import (
     width_as_predicted,
 )
 from conformance.audit.claims.misprints import ZERO, loop_area
-from conformance.audit.runs import Sample, scene_of
+from conformance.audit.runs import SCENES, Sample, scene_of
 from conformance.audit.tolerances import (
     LEVEL,
     N_SIGMA,
@@ -41,9 +41,8 @@ from conformance.audit.tolerances import (
     spread,
     stated,
 )
-from scene import Fourier
 from scene.laws import bounds
-from scene.tables import Mushroom, laws
+from scene.tables import laws
 
 MOVING = ("moving-cap@1e6", "moving-cap@1e7")
 MODE_BINS = np.linspace(-0.8, 1.1, 77)
@@ -269,10 +268,10 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
         (1 - float(theirs.p_nc) ** 0.5) ** 2,
         band=predicted(retraced).theory_error.p_nc + abs(predicted(retraced).p_nc - float(theirs.p_nc)),
     )
-    for name, table in ONE_PARAMETER.items():
-        result = evidence.predict(table)
+    for parameter in ("radius", "depth", "mouth", "slope"):
+        result = evidence.predict(SCENES[f"only-{parameter}"])
         yield stated(
-            f"only {name} moves, and nu with it one way: theory",
+            f"only the {parameter} moves, and nu with it one way: theory",
             result.m1 == 0 and result.log_e_nc == 0,
             f"m1 = {float(result.m1):.1g}",
             "m1 = 0",
@@ -283,19 +282,6 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
             less_bias(GROWTH, sample, 0.0, scale=0.04),
             escape(evidence, sample),
         ]
-
-
-def _one_parameter() -> dict[str, Mushroom]:
-    moving = Fourier(1.0, 1.0, (), (0.3,))
-    return {
-        "the radius": Mushroom(r=moving, h=1.0, w=0.6, slope=0.1111),
-        "the depth": Mushroom(r=1.0, h=moving, nu=0.6, slope=0.1111),
-        "the mouth": Mushroom(r=1.0, h=1.0, nu=Fourier(0.6, 1.0, (0.4,)), slope=0.1111),
-        "the slope": Mushroom(r=1.0, h=1.0, nu=0.6, slope=Fourier(0.2, 1.0, (), (0.1,))),
-    }
-
-
-ONE_PARAMETER = _one_parameter()
 
 
 def both_ways(evidence: ClaimEvidence) -> Iterator[Check]:

@@ -17,7 +17,7 @@ from scipy.stats import norm
 
 import theory
 from conformance.audit.claim import Check, ClaimEvidence, Form
-from conformance.audit.runs import RUNS, Sample, Simulation, scene_of
+from conformance.audit.runs import RUNS, Sample, scene_of
 from conformance.audit.tolerances import (
     N_SIGMA,
     Cdf,
@@ -71,12 +71,6 @@ def predicted(sample: Sample) -> theory.FiniteEnergy:
 def adiabatic(sample: Sample) -> theory.FiniteEnergy:
     """Return the same sums at infinite energy, so that a difference holds finite energy alone."""
     return theory.at_energy(scene_of(sample.run), INFINITE)
-
-
-@cache
-def adiabatic_limit(run: Simulation) -> theory.Prediction:
-    """Return the adiabatic theory of a run's cycle, to 15 digits."""
-    return theory.predict(scene_of(run), 15)
 
 
 class Figure(NamedTuple):

@@ -122,16 +122,6 @@ class Binary:
         return self.ctx.make_mpf(from_man_exp(mantissa, int(exponent), *self.ctx._prec_rounding))
 
 
-def check_system(ctx: object) -> None:
-    """Refuse what is no number system.
-
-    Raises:
-        BadInput: naming what was given.
-    """
-    if not all(hasattr(ctx, name) for name in ("pi", "sqrt", "hypot")):
-        raise BadInput(f"ctx = {shown(ctx)}, must be a number system: mpmath.fp, an MPContext, or numpy")
-
-
 def check_real(**numbers: object) -> None:
     """Refuse what is neither a finite real number, of any precision, nor an array of such.
 
@@ -160,9 +150,10 @@ def in_system(ctx: Any, **numbers: object) -> list[Any]:
         numbers: by field name.
 
     Raises:
-        BadInput: naming field, value and bound.
+        BadInput: naming what was given as number system, or field, value and bound.
     """
-    check_system(ctx)
+    if not all(hasattr(ctx, name) for name in ("pi", "sqrt", "hypot")):
+        raise BadInput(f"ctx = {shown(ctx)}, must be a number system: mpmath.fp, an MPContext, or numpy")
     one = _of_numpy if ctx is np else partial(one_of, ctx)
     return [one(field, number) for field, number in numbers.items()]
 
@@ -208,13 +199,10 @@ def real_numbers(ctx: Any, field: str, values: object) -> list[Any]:
     for i, value in enumerate(values):
         if isinstance(value, str):
             try:
-                number = ctx.mpf(value)
+                value = ctx.mpf(value)
             except ValueError:
                 raise BadInput(f"{field}[{i}] = {shown(value)}, must be a decimal number") from None
-        else:
-            number = one_of(ctx, f"{field}[{i}]", value)
-        check_real(**{f"{field}[{i}]": number})
-        found.append(number)
+        found.append(one_of(ctx, f"{field}[{i}]", value))
     return found
 
 

@@ -26,7 +26,8 @@ from scipy.ndimage import map_coordinates
 
 import scene as scenes
 from scene.geometry import table_at
-from scene.laws import BangBang, breakpoints, values
+from scene.laws import breakpoints, values
+from scene.mouth import start_time
 from scene.tables import Mushroom, Scene, laws
 from scene.transforms import backwards
 from theory.branches import Floats, chaotic_zone, tree
@@ -292,7 +293,7 @@ def _clock_start(scene: Mushroom) -> float:
         NotCovered: some particles are in the island then that leave it later.
     """
     length, opening = scene.period, float(Cycle.of(scene, 15).start)
-    start = next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
+    start = start_time(scene)
     start += length * float(np.floor((opening - start) / length + ROUNDING))
     last = max((float(branch.ends[2].max()) for branch in tree(scene).all_branches()), default=start)
     if last > start + length * (1 + ROUNDING):

@@ -370,14 +370,7 @@ def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
 
 
 def at(law: Law, t: Any) -> Any:
-    """Return the value of a law at a time, or an array of values at an array of times of any shape."""
-    times = finite_times(t)
-    found = values(law, times.reshape(-1)).reshape(times.shape)
-    return found if times.ndim else float(found)
-
-
-def finite_times(t: object) -> FloatArray:
-    """Return times as an array.
+    """Return the value of a law at a time, or an array of values at an array of times of any shape.
 
     Raises:
         BadInput: a time is not a finite number.
@@ -388,7 +381,8 @@ def finite_times(t: object) -> FloatArray:
         raise BadInput(f"t = {shown(t)}, must be finite numbers") from None
     if not np.isfinite(times).all():
         raise BadInput(f"t = {times[~np.isfinite(times)][0]}, must be finite")
-    return times
+    found = values(law, times.reshape(-1)).reshape(times.shape)
+    return found if times.ndim else float(found)
 
 
 def bounds(law: Law) -> Bounds:

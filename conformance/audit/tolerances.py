@@ -180,6 +180,12 @@ def critical_gap(n: int) -> float:
     return float(kstwo.isf(LEVEL, n))
 
 
+def seen_late(cdf: Cdf, times: FloatArray, wait: float) -> float:
+    """Return how far the distribution of times moves, at most, if each may be seen by `wait` later."""
+    grid = np.linspace(times.min(), times.max(), 2000)
+    return float(np.max(cdf(grid) - cdf(grid - wait)))
+
+
 def chance(values: FloatArray, cdf: Cdf) -> float:
     """Return Kolmogorov's p: how likely so large a distance is if the law is right."""
     return float(ks_1samp(values, cdf, method="exact").pvalue)

@@ -32,8 +32,6 @@ LATE = 16  # steps of a cycle, by which times may miss it: captures are seen fro
 REACH = 7.0  # standard deviations beyond which no kernel is computed
 LEAST = 1e-12  # variance of a kernel, in log E: a lag's square may leave less than none
 LARGEST = 2.0**1000  # of an energy: where its double is no float, fast particles seem slow
-TOO_SLOW = "energy = {}: walls turn too soon for particles so slow, and theory has no distribution"
-UNMEASURED = "energy = {}: particles so slow, below a speed of {:g}, are beyond the measured rates"
 MOST = 4.0  # variance of a kernel, in log E: beyond it what the peak has of it, v - v^2 / 8, falls again
 
 
@@ -113,10 +111,16 @@ class FiniteEnergy:
         with np.errstate(all="ignore"):  # lags as large as log E itself: refused below
             self._solve()
             if not self._fields.is_known:
-                raise NotCovered(UNMEASURED.format(energy, SPEEDS[0]))
+                raise NotCovered(
+                    f"energy = {energy}: particles so slow, below a speed of {SPEEDS[0]:g},"
+                    " are beyond the measured rates"
+                )
             is_one = self.point_masses.variance.max() < MOST and self.variance_s > 0 and self.peak[1] > 0
         if not is_one:
-            raise NotCovered(TOO_SLOW.format(energy))
+            raise NotCovered(
+                f"energy = {energy}: walls turn too soon for particles so slow,"
+                " and theory has no distribution"
+            )
         self._below: dict[str, tuple[Floats, Floats]] = {}
 
     def _solve(self) -> None:

@@ -16,6 +16,7 @@ cycle has Phi(-1 - q) for Phi(q), hence the same I; a loop that is its own rever
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -160,7 +161,7 @@ class Lattice:
         They are a point mass at s = 0, which the lattice shares among its points.
         """
         kept = abs(self.s_nc) <= KEPT and not _is_still(self.root)
-        return self._still(self.root) + (self.root.p_nc if kept else 0.0)
+        return self._transform(self.root, KEPT) + (self.root.p_nc if kept else 0.0)
 
     def often_below(self, s: Floats) -> Floats:
         """Return the probability of being captured twice or more and ending at or below each s."""
@@ -168,25 +169,17 @@ class Lattice:
         masses = self.masses(self.transform - self.root.p_nc - once)
         return np.interp(s - self.s_nc, self.places, cumulated(masses))
 
-    def _transform(self, node: Node) -> Complexes:
+    def _transform(self, node: Node, most: float = math.inf) -> Complexes:
+        """Return the transform of what a well does to particles whose s it changes by no more than `most`."""
         # From the well's top, d counted from its own uncaptured energy.
-        found: Complexes = np.full(self.n_points // 2 + 1, node.passed, dtype=np.complex128)
+        passed = node.passed if abs(node.gain) <= most else 0.0
+        found: Complexes = np.full(self.n_points // 2 + 1, passed, dtype=np.complex128)
         for child in node.children:
-            found *= self._transform(child)
-        for branch in node.branches:
-            found += self._captured(branch) / node.p_top
-        return found
-
-    def _still(self, node: Node) -> Complexes:
-        found = np.zeros(self.n_points // 2 + 1, dtype=np.complex128)
-        if abs(node.gain) <= KEPT:
-            found += node.passed
-            for child in node.children:
-                found *= self._still(child)
+            found *= self._transform(child, most)
         # From the well's top, panel after panel.
         gains = np.split(node.s, np.cumsum([len(branch.s) for branch in node.branches])[:-1])
         for branch, gain in zip(node.branches, gains, strict=False):
-            if np.abs(gain).max() <= KEPT:
+            if np.abs(gain).max() <= most:
                 found += self._captured(branch) / node.p_top
         return found
 

@@ -260,7 +260,7 @@ def zone(*samples: Sample) -> Figure:
     """Draw mean log E of the uncaptured and the share in the chaotic zone through the cycle."""
     figure, axes = new_figure(9.6, 3.0 * len(samples), len(samples), 2)
     for (left, right), sample in zip(np.reshape(axes, (-1, 2)), samples, strict=True):
-        times, means, _ = zone_energy(sample)
+        times, means = zone_energy(sample)
         span = times[0] / sample.run.phases[0]
         fine = np.linspace(0, span, 400)
         curve = theory.chaotic_zone(scene_of(sample.run), fine)

@@ -288,7 +288,7 @@ def energy_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
     """L5: mean log E in the chaotic zone against eq. (dE), with its drift and the others' lags."""
     for run, every in (("moving-cap@1e7", 2), (ACW, 1), ("fixed-cap-anticlockwise@1e7", 1)):
         sample = evidence.sample(run)
-        times, means, _ = zone_energy(sample)
+        times, means = zone_energy(sample)
         found = predicted(sample)
         expected, wait = found.zone(times)[0], found.zone(np.array(times) - chord_time(sample))[0]
         for k in range(every - 1, len(times), every):

@@ -159,15 +159,14 @@ def captured_band(sample: Sample) -> float:
     return steepest * left.captured_mean + WIDENED * left.variance + SKEWED * left.skewness
 
 
-def zone_energy(sample: Sample) -> tuple[list[float], list[Mean], list[float]]:
-    """Return times of the phases, mean log E/E0 of those not captured so far, and their spreads."""
-    times, means, spreads = phase_times(sample), [], []
+def zone_energy(sample: Sample) -> tuple[list[float], list[Mean]]:
+    """Return times of the phases, and mean log E/E0 of those not captured so far."""
+    times, means = phase_times(sample), []
     for k, time in enumerate(times):
         with np.errstate(invalid="ignore"):
             free = ~sample.captured | (time < sample.first_capture[0])
         means.append(mean(sample.phase_s[free, 0, k]))
-        spreads.append(spread(sample.phase_s[free, 0, k]).value)
-    return times, means, spreads
+    return times, means
 
 
 def phase_times(sample: Sample) -> list[float]:

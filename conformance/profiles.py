@@ -43,9 +43,8 @@ from mpmath import fp
 
 from scene import BadInput, Horizon, Mushroom, Outcome, Scene, State
 from scene.geometry import area, half_width, table_at
-from scene.laws import values
+from scene.laws import size_bounds, values
 from scene.protocol.wire import Flowing
-from scene.sizes import size_bounds
 from scene.tables import laws
 from scene.transforms import backwards
 

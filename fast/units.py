@@ -33,9 +33,8 @@ from fast.kernel.records import (  # isort: skip
     FloatArray, IntArray,
 )  # fmt: skip
 from scene import BangBang, Cap, Fourier, InvalidState, Law, Mushroom, Scene, State
-from scene.laws import Bounds, bounds, is_constant
+from scene.laws import Bounds, bounds, is_constant, size_bounds
 from scene.refusal import BadInput, InvalidScene
-from scene.sizes import size_bounds
 from scene.tables import laws, period, width_factors
 from scene.transforms import scaled_law, times_power
 

@@ -124,9 +124,7 @@ def law_jet(law: Law, time: Fraction) -> Jet:
     piece = piece_at(law, time)
     if isinstance(piece, Quadratic):
         u = time - piece.origin
-        return _rational_jet(
-            piece.c0 + u * (piece.c1 + u * piece.c2), piece.c1 + 2 * u * piece.c2, 2 * piece.c2
-        )
+        return _rational_jet(piece.c0 + u * u * piece.c2, 2 * u * piece.c2, 2 * piece.c2)
     if not isinstance(piece, Fourier):
         return _rational_jet(Fraction(piece))
     if piece.omega is None:

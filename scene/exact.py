@@ -32,8 +32,7 @@ def leg_polynomial(law: Law, start: Fraction) -> Polynomial:
     piece = piece_at(law, start)
     if isinstance(piece, Quadratic):
         d = start - piece.origin
-        c0, c1, c2 = piece.c0, piece.c1, piece.c2
-        return trimmed([c0 + d * (c1 + d * c2), c1 + 2 * c2 * d, c2])
+        return trimmed([piece.c0 + piece.c2 * d**2, 2 * piece.c2 * d, piece.c2])
     assert isinstance(piece, float)
     return trimmed([Fraction(piece)])
 

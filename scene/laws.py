@@ -21,9 +21,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from scene.given import MAX_KNOTS, amplitudes, check_legs, checked_knot, finite_times
-from scene.refusal import InvalidScene, check_number, listed, shown
+from scene.refusal import BadInput, InvalidScene, check_number, listed, shown
 
+MAX_HARMONICS = 16  # validity is decided by exact algebra, whose cost grows steeply with the degree
+MAX_KNOTS = 256
 LEAST_NORMAL = 2.0**-1022
 
 FloatArray = NDArray[np.float64]
@@ -104,6 +105,55 @@ class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", f
 Law = float | Fourier | BangBang
 
 
+def amplitudes(field: str, numbers: object) -> tuple[float, ...]:
+    """Return a Fourier law's amplitudes.
+
+    Raises:
+        InvalidScene: they are not a list of finite numbers, or too many.
+    """
+    numbers = listed(numbers)
+    if not isinstance(numbers, tuple | list):
+        raise InvalidScene(f"{field} = {shown(numbers)}, must be a list of numbers")
+    if len(numbers) > MAX_HARMONICS:
+        raise InvalidScene(f"{field} has {len(numbers)} harmonics, at most {MAX_HARMONICS} are allowed")
+    return tuple(check_number(f"{field}[{k}]", number, InvalidScene) for k, number in enumerate(numbers))
+
+
+def checked_knot(i: int, knot: object) -> tuple[float, float]:
+    """Return a bang-bang law's knot number i.
+
+    Raises:
+        InvalidScene: it is not a pair of finite numbers.
+    """
+    knot = listed(knot)
+    if not (isinstance(knot, tuple | list) and len(knot) == 2):
+        raise InvalidScene(f"bang-bang.knots[{i}] = {shown(knot)}, must be a pair [time, value]")
+    time, value = knot
+    return (
+        check_number(f"bang-bang.knots[{i}] time", time, InvalidScene),
+        check_number(f"bang-bang.knots[{i}] value", value, InvalidScene),
+    )
+
+
+def check_legs(knots: tuple[tuple[float, float], ...]) -> None:
+    """Refuse knots whose times do not increase, that do not close, or whose span is not a binary64 number.
+
+    Raises:
+        InvalidScene: naming the knot, the value and the bound.
+    """
+    for i, ((before, _), (after, _)) in enumerate(itertools.pairwise(knots), 1):
+        if after <= before:
+            raise InvalidScene(f"bang-bang.knots[{i}] time = {after}, must be > {before}")
+    (start, first), (end, last) = knots[0], knots[-1]
+    if last != first:
+        raise InvalidScene(
+            f"bang-bang.knots[{len(knots) - 1}] value = {last}, must equal the first ({first}): no jumps"
+        )
+    span = end - start
+    if not math.isfinite(span) or Fraction(span) != Fraction(end) - Fraction(start):
+        raise InvalidScene(f"bang-bang.knots span {start} to {end}: the period must be a binary64 number")
+
+
 def _keep(law: msgspec.Struct, field: str, value: Any) -> None:
     if getattr(law, field) is not value:
         msgspec.structs.force_setattr(law, field, value)
@@ -123,11 +173,10 @@ class Period(NamedTuple):
 
 
 class Quadratic(NamedTuple):
-    """c0 + c1 (t - origin) + c2 (t - origin)^2 until `end`, all exact rationals."""
+    """c0 + c2 (t - origin)^2 until `end`, all exact rationals: a bang-bang law rests at its knots."""
 
     origin: Fraction
     c0: Fraction
-    c1: Fraction
     c2: Fraction
     end: Fraction
 
@@ -192,8 +241,8 @@ def half_legs(law: BangBang) -> tuple[Quadratic, ...]:
     for knot, next_knot in itertools.pairwise(law.knots):
         (start, before), (stop, after) = map(Fraction, knot), map(Fraction, next_knot)
         half_acceleration = 2 * (after - before) / (stop - start) ** 2
-        found.append(Quadratic(start, before, Fraction(0), half_acceleration, (start + stop) / 2))
-        found.append(Quadratic(stop, after, Fraction(0), -half_acceleration, stop))
+        found.append(Quadratic(start, before, half_acceleration, (start + stop) / 2))
+        found.append(Quadratic(stop, after, -half_acceleration, stop))
     return tuple(found)
 
 
@@ -228,7 +277,7 @@ def _at_float(piece: Quadratic, t: float | FloatArray, order: int) -> Any:
     if isinstance(t, np.ndarray):
         return np.array([_at_float(piece, each, order) for each in t.ravel().tolist()]).reshape(t.shape)
     x = Fraction(t) - piece.origin
-    found = (piece.c0 + x * (piece.c1 + x * piece.c2), piece.c1 + 2 * piece.c2 * x, 2 * piece.c2)
+    found = (piece.c0 + piece.c2 * x**2, 2 * piece.c2 * x, 2 * piece.c2)
     return exact(_Arrays, found[order])
 
 
@@ -250,8 +299,8 @@ def evaluate(ctx: Any, piece: Piece, t: Any, order: int = 0) -> Any:
         if ctx.mpf is float and math.isinf(c2):
             return _at_float(piece, t, order)
         if order == 0:
-            return exact(ctx, piece.c0) + x * (exact(ctx, piece.c1) + x * c2)
-        return exact(ctx, piece.c1) + 2 * c2 * x if order == 1 else 2 * c2
+            return exact(ctx, piece.c0) + x * (x * c2)
+        return 2 * c2 * x + 0 if order == 1 else 2 * c2  # + 0: what rests has the rate 0, not minus 0
     if isinstance(piece, Fourier):
         return _trigonometric(ctx, piece, t, order)
     return ctx.mpf(piece) if order == 0 else ctx.mpf(0)
@@ -286,12 +335,7 @@ def value(ctx: Any, law: Law, t: Any, order: int = 0) -> Any:
     if isinstance(t, np.ndarray):
         return values(law, t, order)
     if isinstance(law, BangBang):
-        # A Python float passes through as it is; an mpf becomes the exact rational it stands for.
-        time = (
-            Fraction(t)
-            if isinstance(t, (int, float, Fraction))
-            else Fraction(*map(int, t.as_integer_ratio()))
-        )
+        time = Fraction(*map(int, t.as_integer_ratio()))  # of mpf the parts are integers of gmpy2
         return evaluate(ctx, piece_at(law, time), t, order)
     return evaluate(ctx, law, t, order)
 
@@ -326,8 +370,17 @@ def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
 
 
 def at(law: Law, t: Any) -> Any:
-    """Return the value of a law at a time, or an array of values at an array of times of any shape."""
-    times = finite_times(t)
+    """Return the value of a law at a time, or an array of values at an array of times of any shape.
+
+    Raises:
+        BadInput: a time is not a finite number.
+    """
+    try:
+        times = np.asarray(t, np.float64)
+    except (TypeError, ValueError):
+        raise BadInput(f"t = {shown(t)}, must be finite numbers") from None
+    if not np.isfinite(times).all():
+        raise BadInput(f"t = {times[~np.isfinite(times)][0]}, must be finite")
     found = values(law, times.reshape(-1)).reshape(times.shape)
     return found if times.ndim else float(found)
 
@@ -392,3 +445,34 @@ def _up(size: float, exponent: int) -> float:
 
 def _slack(level: float, swing: float) -> float:
     return (abs(level) + swing) * 2.0**-50
+
+
+def size_bounds(law: Law) -> Bounds:
+    """Bound a law that is a size (radius, width, depth or nu), positive because its scene is valid.
+
+    `bounds` subtracts all amplitudes of a Fourier law from its mean. The result may be negative although the
+    law is not: 1 + 0.9 cos x - 0.35 cos 3x is above 0.1. Here the least value is never below 0; a lower bound
+    of 0 only says that the law is positive.
+    """
+    found = bounds(law)
+    if found.lowest > 0.0 or not isinstance(law, Fourier):
+        return found
+    return found._replace(lowest=_least_by_samples(law))
+
+
+def _least_by_samples(law: Fourier) -> float:
+    """Bound a positive Fourier law from below by samples; return 0 if they do not show a positive bound.
+
+    Between samples at distance d, f is at least the lower neighbour minus max |f''| d^2 / 8. Units are the
+    mean, which is positive, and the phase.
+    """
+    waves = [(k, c / law.mean, s / law.mean) for k, c, s in law.harmonics()]
+    size = 1.0 + sum(k * (abs(c) + abs(s)) for k, c, s in waves)  # bounds what a rounded phase does, too
+    bend = sum(k * k * (abs(c) + abs(s)) for k, c, s in waves)
+    for n in (2**8, 2**11, 2**14, 2**17):
+        phases = np.arange(n) * (2.0 * np.pi / n)
+        least = float((1.0 + sum(c * np.cos(k * phases) + s * np.sin(k * phases) for k, c, s in waves)).min())
+        found = least - bend * (2.0 * np.pi / n) ** 2 / 8.0 - 2.0**-40 * size
+        if found > 0.5 * least:
+            return found * law.mean
+    return 0.0

@@ -55,10 +55,9 @@ class _Table(
             InvalidScene: one line naming the parameter, the value or the time, and the bound.
         """
         for field in self.__struct_fields__:
-            kept = getattr(self, field)
-            if type(kept) is float or field not in PARAMETERS:
+            if field not in PARAMETERS:
                 continue
-            given = listed(kept)
+            given = listed(getattr(self, field))
             if isinstance(given, Fourier | BangBang) or (given is None and field in self.optional):
                 continue
             if isinstance(given, bool) or not isinstance(given, Real):
@@ -165,9 +164,6 @@ def _prove(table: type[_Table], given: tuple[Law | None, ...]) -> None:
     # Cached by value: -0.0 and 0.0 count as equal, and validity is a matter of real numbers. A refusal is
     # not kept, so its message shows the numbers at hand.
     found = {name: law for name, law in zip(PARAMETERS, given, strict=True) if law is not None}
-    for name, law in found.items():
-        if isinstance(law, float):
-            check_number(name, law, InvalidScene)
     if table is Mushroom and (("w" in found) == ("nu" in found)):
         raise InvalidScene("a mushroom needs exactly one of `w` and `nu`")
     prove(found, _conditions(found))

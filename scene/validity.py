@@ -4,44 +4,60 @@ Each condition is the sign of a sum of products of laws. For trigonometric laws 
 substitution x = tan(omega t / 2) makes it a rational polynomial over the real line, for
 bang-bang laws it is one on each leg. `scene.exact` decides its sign, and contact too: nu = 1
 at one instant is valid, nu > 1 by one unit in the last place is not. If laws of both kinds move in a
-condition, `scene.mixed` decides it. Then the two sides must not touch: contact is refused.
+condition, intervals decide it. Then the two sides must not touch: contact is refused.
+
+A condition of both kinds is no polynomial, but it is smooth on each leg of the bang-bang laws. On an interval
+of half-width h about m the mean value theorem says
+
+    f(t) lies in f(m) + f'([m - h, m + h]) [-h, h]    for |t - m| <= h.
+
+An interval is done if all of that is positive; otherwise it is halved. Near a contact no interval is small
+enough. The search then ends and reports where.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from math import inf, isfinite, prod
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from scene import exact, mixed
+from scene import exact
 from scene.exact import half_angle, leg_intervals, leg_polynomial, one_plus_square
 from scene.laws import (
     BangBang,
     Law,
     Period,
     bounds,
+    evaluate,
     is_constant,
     period_of,
+    piece_at,
     shared_period,
     value,
     values,
 )
 from scene.laws import exact as number
-from scene.precision import decimals
+from scene.precision import decimals, intervals
 from scene.refusal import InvalidScene
 
+MAX_BOXES = 8_000  # a scene with 512 half legs needs one to some for each, at up to 3 ms
+MAX_HALVINGS = 64  # laws that keep apart by 2^-120 of their size are still told apart
+BITS = 256  # a time may be 2^53 periods, of which no digit that counts is lost
+
 Laws = Mapping[str, Law]
+Interval = Any  # mpmath's, which has no type stubs
+Terms = Sequence[tuple[int, tuple[Law, ...]]]
 
 
 class Condition(NamedTuple):
     """sum of sign * product(laws) must be > 0 (strict) or >= 0."""
 
     text: str
-    terms: tuple[tuple[int, tuple[Law, ...]], ...]
+    terms: Terms
     is_strict: bool = True
 
 
@@ -118,7 +134,7 @@ def _check(laws: Laws, condition: Condition) -> None:
     used = [law for _, factors in condition.terms for law in factors if not is_constant(law)]
     legs = [law for law in used if isinstance(law, BangBang)]
     if 0 < len(legs) < len(used):
-        verdict = mixed.sign_on_legs(condition.terms, condition.is_strict, leg_intervals(legs))
+        verdict = sign_on_legs(condition.terms, condition.is_strict, leg_intervals(legs))
         if verdict.holds is None:
             raise InvalidScene(
                 f"{condition.text} cannot be shown near t = {float(verdict.time):.6g}: where Fourier and"
@@ -130,6 +146,56 @@ def _check(laws: Laws, condition: Condition) -> None:
     for p, a, b in _on_legs(condition, legs) if legs else _on_circle(condition):
         if exact.negative_point(p, a, b) is not None or (condition.is_strict and exact.vanishes(p, a, b)):
             raise InvalidScene(_message(laws, condition))
+
+
+class SignVerdict(NamedTuple):
+    """Whether a condition holds at all times; None if this is open near the given time."""
+
+    holds: bool | None
+    time: Fraction
+
+
+def sign_on_legs(terms: Terms, is_strict: bool, legs: Iterable[tuple[Fraction, Fraction]]) -> SignVerdict:
+    """Decide whether the sum of sign * product(laws) is > 0 (strict) or >= 0 at all times.
+
+    Args:
+        terms: (sign, laws); bang-bang laws and Fourier laws that give their period.
+        is_strict: whether 0 is not enough.
+        legs: intervals that cover one period, each within one piece of every bang-bang law.
+
+    Returns:
+        The verdict. Its time is one at which the condition fails, or near which it is open.
+    """
+    todo = [((a + b) / 2, (b - a) / 2, 0) for a, b in legs]
+    for _ in range(MAX_BOXES):
+        if not todo:
+            return SignVerdict(True, Fraction(0))
+        m, h, n_halvings = todo.pop()
+        at_m, over = enclose(terms, m, h)
+        if at_m.b < 0 or (is_strict and at_m.b == 0):
+            return SignVerdict(False, m)
+        if over.a > 0 or (over.a == 0 and not is_strict):
+            continue
+        if n_halvings == MAX_HALVINGS:
+            return SignVerdict(None, m)
+        todo += [(m - h / 2, h / 2, n_halvings + 1), (m + h / 2, h / 2, n_halvings + 1)]
+    return SignVerdict(None, todo[-1][0]) if todo else SignVerdict(True, Fraction(0))
+
+
+def enclose(terms: Terms, m: Fraction, h: Fraction) -> tuple[Interval, Interval]:
+    """Enclose the sum of sign * product(laws) at m, and within h of m on the pieces that hold at m."""
+    ctx = intervals(BITS)
+    t, away = number(ctx, m), number(ctx, h) * ctx.mpf([-1, 1])
+    total, total_rate = ctx.mpf(0), ctx.mpf(0)
+    for sign, laws in terms:
+        at_m, rate = ctx.mpf(sign), ctx.mpf(0)
+        for law in laws:
+            piece = piece_at(law, m)
+            factor, factor_rate = evaluate(ctx, piece, t), evaluate(ctx, piece, t + away, 1)
+            rate = rate * (factor + away * factor_rate) + (at_m + away * rate) * factor_rate
+            at_m = at_m * factor
+        total, total_rate = total + at_m, total_rate + rate
+    return total, total + away * total_rate
 
 
 def _on_legs(

@@ -19,9 +19,9 @@ from conformance.audit import frozen
 from conformance.audit.claim import AuditSteppers, ClaimEvidence, verdict_of
 from conformance.audit.claims import (
     assumptions,
-    broadened,
     experiments,
     exponents,
+    finite_energy,
     many_cycles,
     select_claims,
 )
@@ -59,14 +59,14 @@ def audited(only="", simulate=adiabatic_particles.simulate, predict=CACHED):
 def _fewer():
     """Draw fewer sums of cycles, whose own errors are part of every comparison; fewer paces and digits."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (broadened, many_cycles):
+        for module in (finite_energy, many_cycles):
             patch.setattr(module, "N_DRAWN", 100_000)
         patch.setattr(assumptions, "N_CLOCKS", 1)
         for module in ("claim", "claims.misprints", "claims.assumptions"):
             name = f"conformance.audit.{module}.DIGITS"
             patch.setattr(name, adiabatic_particles.DIGITS)  # what is predicted is shared
         yield
-        broadened.summed.cache_clear()
+        finite_energy.summed.cache_clear()
 
 
 @pytest.mark.deep

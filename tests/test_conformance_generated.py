@@ -47,7 +47,7 @@ from conformance.verify import Verdict, verify_line
 from fast import paths
 from fast.__main__ import carry, follow
 from scene import BadInput, BangBang, Fourier, Horizon, Mushroom, Rejected, State, Undecided, from_data
-from scene.given import MAX_KNOTS
+from scene.laws import MAX_KNOTS
 from scene.tables import laws
 
 # The fault, and the row of the table of families whose questions it answers wrong; none for a run's first.

@@ -54,8 +54,7 @@ from scene import (
     transforms,
 )
 from scene.geometry import rounded
-from scene.laws import bounds, is_constant, values
-from scene.sizes import size_bounds
+from scene.laws import bounds, is_constant, size_bounds, values
 from scene.states import check_numbers
 from scene.tables import laws as laws_of
 from scene.tables import period

@@ -43,11 +43,10 @@ from mushrooms.store import conduct
 from mushrooms.store.spec import FIELDS, RunSpec, Shape, shape_of
 from reference.arithmetic import MAX_WORK
 from scene import BadInput, from_data, load
-from scene.given import MAX_HARMONICS, MAX_KNOTS
-from scene.laws import value
+from scene.laws import MAX_HARMONICS, MAX_KNOTS, value
 from scene.load import catalogue, catalogue_text
 from scene.tables import laws
-from theory.large_deviations import loss_probability
+from theory.distribution import loss_probability
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"

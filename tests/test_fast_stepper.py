@@ -50,8 +50,7 @@ from scene import (
     Undefined,
     load,
 )
-from scene.laws import bounds, values
-from scene.sizes import size_bounds
+from scene.laws import bounds, size_bounds, values
 from scene.states import check_numbers
 
 

@@ -26,17 +26,17 @@ from scene import (
     catalogue,
     from_data,
     load,
-    mixed,
     to_data,
+    validity,
 )
 from scene import mouth as module
 from scene.exact import leg_intervals
 from scene.geometry import area, rounded, table_at
 from scene.laws import bounds, breakpoints, exact, shared_period, value, values
-from scene.mixed import sign_on_legs
 from scene.mouth import mouth_minima
 from scene.tables import laws as laws_of
 from scene.tables import period
+from scene.validity import sign_on_legs
 
 UP = math.nextafter(1.0, 2.0)
 DOWN = math.nextafter(1.0, 0.0)
@@ -276,7 +276,7 @@ def test_conditions_are_enclosed():
         wave, legs = random_laws(draw)
         a, b = draw.choice(leg_intervals([legs]))
         m, h = (a + b) / 2, (b - a) / 2 / draw.choice((1, 4, 1024))
-        at_m, over = mixed.enclose([(1, (wave, legs)), (-1, (0.5,))], m, h)
+        at_m, over = validity.enclose([(1, (wave, legs)), (-1, (0.5,))], m, h)
         assert at_m.delta < 1e-30
         for t in (m, *(m + h * Fraction(draw.randint(-1000, 1000), 1001) for _ in range(8))):
             assert over.a < exactly(wave, t) * exactly(legs, t) - 0.5 < over.b
@@ -311,21 +311,21 @@ def test_a_contact_is_refused_in_words():
 def test_a_lost_slope_is_caught(monkeypatch):
     """At the top of a wave it is level: the mutant holds the wave to be as high all along."""
     terms = ((1, (Fourier(1.0, cos=(0.25,), period=1.0),)), (-1, (1.0,)))
-    interval, honest = [(Fraction(-2, 5), Fraction(2, 5))], mixed.enclose
+    interval, honest = [(Fraction(-2, 5), Fraction(2, 5))], validity.enclose
     assert sign_on_legs(terms, False, interval).holds is False
-    monkeypatch.setattr(mixed, "enclose", lambda terms, m, h: (honest(terms, m, h)[0],) * 2)
+    monkeypatch.setattr(validity, "enclose", lambda terms, m, h: (honest(terms, m, h)[0],) * 2)
     assert sign_on_legs(terms, False, interval).holds is True
 
 
 def test_the_work_is_bounded(monkeypatch):
     wave, legs = dip(0.0)
-    monkeypatch.setattr(mixed, "MAX_BOXES", 20)
+    monkeypatch.setattr(validity, "MAX_BOXES", 20)
     assert sign_on_legs(((1, (wave,)), (-1, (legs,))), False, leg_intervals([legs])).holds is None
 
 
 def test_products_known_to_be_positive_need_no_proof(monkeypatch):
     """With slope 0 the stem is open wherever nu r > 0, however near to 0 that comes."""
-    monkeypatch.setattr(mixed, "MAX_BOXES", 0)
+    monkeypatch.setattr(validity, "MAX_BOXES", 0)
     nu = Fourier(0.5, cos=(0.5 - 2.0**-40,), period=1.0)
     r = BangBang(((0.0, 1.0), (0.5, 5e-324), (1.0, 1.0)))
     assert Mushroom(r=r, nu=nu, h=1.0).nu == nu

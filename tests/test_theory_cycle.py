@@ -33,8 +33,7 @@ from theory import (
 )
 from theory.adiabatic import captures
 from theory.critical import solve_rising, spans
-from theory.cycle import NuWell
-from theory.parameters import MovingMushroom
+from theory.cycle import MovingMushroom, NuWell
 
 
 def test_moving_cap_releases_at_two_pi_minus_t() -> None:

@@ -19,10 +19,18 @@ from scene.tables import laws
 from scene.transforms import backwards
 from theory import NotCovered, cumulants
 from theory.finite_energy import rates
-from theory.finite_energy.coefficients import N_TIMES, Fields
 from theory.finite_energy.fits import extrapolate, fit_power, unbiased_mean
 from theory.finite_energy.one_cycle import FiniteEnergy, PointMasses, _joined, at_energy, kernel_cdf
-from theory.finite_energy.rates import MEMORIES, PHASES, SPEEDS, frozen_rates, kick_rates, rates_at
+from theory.finite_energy.rates import (
+    MEMORIES,
+    N_TIMES,
+    PHASES,
+    SPEEDS,
+    Fields,
+    frozen_rates,
+    kick_rates,
+    rates_at,
+)
 
 CYCLES = (
     "fixed-cap-anticlockwise",

@@ -17,7 +17,7 @@ import theory
 from scene import BangBang, Cap, Fourier, Mushroom, Stem, load
 from scene.transforms import scaled
 from theory import volumes
-from theory.validation import MAX_DIGITS, MAX_ORDER
+from theory.precision import MAX_DIGITS, MAX_ORDER
 
 SCENE = load("moving-cap")
 FP = mpmath.fp

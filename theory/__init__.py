@@ -1,24 +1,33 @@
 """The paper's closed forms and quadratures, at any precision.
 
 `volumes` has the formulas for volumes of phase space. `cycle` computes when particles are captured and
-released, `adiabatic` how their energy changes, and `prediction` the figures of one cycle. `curves`, `density`
-and `distribution` describe energies after one cycle, `large_deviations` after many cycles. `finite_energy`
-goes beyond the paper.
+released, `adiabatic` how their energy changes, and `prediction` the figures of one cycle. `branches` has its
+curves, `density` and `distribution` the energies after one cycle, `distribution` those after many cycles too.
+`finite_energy` goes beyond the paper.
 """
 
 from theory.adiabatic import NotConverged
-from theory.curves import (
+from theory.branches import (
     CaptureCurve,
     ChaoticZone,
     capture_curve,
     capture_time_mass,
     chaotic_zone,
-    energy_density,
     largest_gain,
 )
 from theory.cycle import Cycle
 from theory.density import Caustic, capture_rate_at, caustics, cdf_at, density_at
-from theory.distribution import Energies, Sum, energies, energy_cdf, sum_of_cycles
+from theory.distribution import (
+    Energies,
+    Rarity,
+    Sum,
+    energies,
+    energy_cdf,
+    energy_density,
+    loss_probability,
+    rarity,
+    sum_of_cycles,
+)
 from theory.finite_energy.fits import (
     Limit,
     PowerFit,
@@ -29,7 +38,6 @@ from theory.finite_energy.fits import (
 from theory.finite_energy.one_cycle import FiniteEnergy, at_energy
 from theory.finite_energy.rates import Rates, frozen_rates
 from theory.finite_energy.upright import is_upright, kept_by_the_cap, upright_rate, upright_spread
-from theory.large_deviations import Rarity, loss_probability, rarity
 from theory.prediction import Prediction, cumulants, mean_of, moments, predict, reversed_cycle
 from theory.volumes import (
     NotCovered,

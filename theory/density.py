@@ -20,9 +20,8 @@ from scene.tables import Scene
 from theory.adiabatic import Captures, Placed
 from theory.branches import turns
 from theory.critical import solve_rising
-from theory.precision import guarded
+from theory.precision import guarded, real_numbers
 from theory.prediction import converged
-from theory.validation import real_numbers
 from theory.volumes import NotCovered, delta_slope, free_share
 
 REACH = 2.0**-12  # of a panel, around a turning point that is known in binary64

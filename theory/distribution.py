@@ -1,4 +1,4 @@
-"""The distribution of s = log E1 / E0 over one cycle and over many, in binary64.
+"""The distribution of s = log E1 / E0 over one cycle and over many, in binary64; how rare losses are.
 
 One cycle: a point mass at s_nc; particles captured once, whose implicit density (Eq:lnE/E0 with Eq:ps) is
 integrated exactly; those captured more often, a convolution on a lattice (right to about 1e-6).
@@ -8,25 +8,36 @@ The mass of a particle between two points is shared among them so that mass and 
 grows by at most step^2 / 4. So the step has to be small against what s does: it is STEP of the reach of s
 in one cycle, which in a nearly trivial cycle may be far below 1. Far tails are
 smaller than the rounding of the transform unless the distribution is first tilted by exp(q s).
+
+With Phi(q) = mean exp(q s) over one cycle the probability of E_n < E_0 falls as exp(-n I),
+I = -min log Phi (Cramer 1938). Phi is convex, Phi(-1) = Phi(0) = 1: its minimum lies between. The reversed
+cycle has Phi(-1 - q) for Phi(q), hence the same I; a loop that is its own reverse has its minimum at -1/2.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Scene
-from theory.branches import UNRESOLVED, Branch, Floats, Node, X, at, noise, tree
-from theory.validation import finite_array
+from theory.adiabatic import Captures
+from theory.branches import UNRESOLVED, Branch, Floats, Node, X, at, noise, rising_edges, tree
+from theory.chebyshev import product
+from theory.critical import solve_rising
+from theory.precision import finite_array, guarded
+from theory.prediction import converged
 
 STEP = 2.0**-12  # the lattice's, at best, and as a share of one cycle's reach
 LEAST_REACH = 1e-12  # of s in a cycle; below, its differences are partly rounding
 MAX_POINTS = 2**20
 MAX_CYCLES = 10_000
+LEAST = 1e-24  # mean of s, a half of its variance: below, every particle keeps its energy
 KEPT = 4 * UNRESOLVED  # of s: a smaller change is none: its sign is rounding
 LARGEST_EXPONENT = 600.0  # exp of it stays finite, and so do sums
 
@@ -98,6 +109,27 @@ def energy_cdf(found: Energies | Scene, s: ArrayLike) -> Floats:
     return energies(found).cdf(levels.ravel()).reshape(levels.shape)
 
 
+def energy_density(scene: Scene, edges: ArrayLike) -> Floats:
+    """Return the probability of being captured and ending with log E1 / E0 in each bin.
+
+    Args:
+        scene: as for `theory.predict`.
+        edges: bin edges, rising, at least two; a histogram's.
+
+    Returns:
+        Probabilities, one per bin. Over all s they add up to 1 - p_nc: particles never captured do
+        not count.
+
+    Raises:
+        BadInput: edges do not rise.
+        NotCovered, NotConverged: as `theory.predict`.
+
+    Source: Eq:lnE/E0 with Eq:ps.
+    """
+    bounds = rising_edges(edges)
+    return np.diff(energies(scene).captured_below(bounds))
+
+
 class Lattice:
     """A cycle's distribution of d = s - s_nc on equidistant points, by its Fourier transform.
 
@@ -129,7 +161,7 @@ class Lattice:
         They are a point mass at s = 0, which the lattice shares among its points.
         """
         kept = abs(self.s_nc) <= KEPT and not _is_still(self.root)
-        return self._still(self.root) + (self.root.p_nc if kept else 0.0)
+        return self._transform(self.root, KEPT) + (self.root.p_nc if kept else 0.0)
 
     def often_below(self, s: Floats) -> Floats:
         """Return the probability of being captured twice or more and ending at or below each s."""
@@ -137,25 +169,17 @@ class Lattice:
         masses = self.masses(self.transform - self.root.p_nc - once)
         return np.interp(s - self.s_nc, self.places, cumulated(masses))
 
-    def _transform(self, node: Node) -> Complexes:
+    def _transform(self, node: Node, most: float = math.inf) -> Complexes:
+        """Return the transform of what a well does to particles whose s it changes by no more than `most`."""
         # From the well's top, d counted from its own uncaptured energy.
-        found: Complexes = np.full(self.n_points // 2 + 1, node.passed, dtype=np.complex128)
+        passed = node.passed if abs(node.gain) <= most else 0.0
+        found: Complexes = np.full(self.n_points // 2 + 1, passed, dtype=np.complex128)
         for child in node.children:
-            found *= self._transform(child)
-        for branch in node.branches:
-            found += self._captured(branch) / node.p_top
-        return found
-
-    def _still(self, node: Node) -> Complexes:
-        found = np.zeros(self.n_points // 2 + 1, dtype=np.complex128)
-        if abs(node.gain) <= KEPT:
-            found += node.passed
-            for child in node.children:
-                found *= self._still(child)
+            found *= self._transform(child, most)
         # From the well's top, panel after panel.
         gains = np.split(node.s, np.cumsum([len(branch.s) for branch in node.branches])[:-1])
         for branch, gain in zip(node.branches, gains, strict=False):
-            if np.abs(gain).max() <= KEPT:
+            if np.abs(gain).max() <= most:
                 found += self._captured(branch) / node.p_top
         return found
 
@@ -259,3 +283,91 @@ def sum_of_cycles(found: Energies | Scene, n_cycles: int, *, q: float = 0.0) -> 
     """
     check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
     return Sum(energies(found).root, n_cycles, q)
+
+
+class Rarity(NamedTuple):
+    """How P(E_n < E_0) falls with n. The numbers are mpf.
+
+    rate: I, per cycle; 0 if energies do not change.
+    place: the q in (-1, 0) at which Phi is least; -1/2 if energies do not change.
+    """
+
+    rate: Any
+    place: Any
+
+
+@guarded
+def rarity(scene: Scene, digits: int = 15) -> Rarity:
+    """Return the rate at which P(E_n < E_0) falls.
+
+    Args:
+        scene: as for `theory.predict`.
+        digits: correct significant digits wanted.
+
+    Raises:
+        NotCovered, NotConverged: as `theory.predict`.
+    """
+    return Rarity(*converged(scene, digits, _least))
+
+
+def _least(found: Captures) -> tuple[Any, ...]:
+    binary = found.binary
+    size = max((abs(s) for _, s in found.point_masses()), default=binary.zero)
+    if size < binary.mpf(10) ** -found.target:
+        return binary.zero, -binary.one / 2
+
+    def slope(q: Any) -> tuple[Any, Any]:
+        p = found.taylor(q, 2)
+        return p[1], 2 * p[2]
+
+    place = solve_rising(binary, slope, -binary.one, binary.zero, -binary.one / 2)
+    return -binary.log(found.taylor(place, 0)[0]), place
+
+
+def loss_probability(found: Energies | Scene, n_cycles: int) -> float:
+    """Return the probability of E_n < E_0 after n independent cycles.
+
+    A particle that keeps its energy does not count as a loss.
+
+    Args:
+        found: from `theory.energies`, or a scene to solve.
+        n_cycles: n, 1 to 10,000.
+
+    Returns:
+        The probability, with a relative error of about 1e-4; 0 if it is below the range of binary64.
+
+    Raises:
+        BadInput: n_cycles out of bounds, or every particle keeps its energy.
+        NotCovered, NotConverged: as `theory.predict`.
+    """
+    n_cycles, found = check_count("n_cycles", n_cycles, 1, MAX_CYCLES), energies(found)
+    slopes = _series(found.root, np.array([-1.0, 0.0]))[1]
+    if not slopes[0] < -LEAST < LEAST < slopes[1]:
+        raise BadInput("every particle keeps its energy in this cycle: nobody loses")
+    place = brentq(lambda q: float(_series(found.root, np.array([q]))[1, 0]), -1.0, 0.0)
+    return found.lost() if n_cycles == 1 else _lost(found, n_cycles, place)
+
+
+def _series(node: Node, q: Floats) -> Floats:
+    """Return mean exp((q + x) s) over a well, from its top, as coefficients of x^0 and x^1: (2, n)."""
+    orders = np.arange(2)
+    captured: Floats = (node.s[None, :] ** orders[:, None] * node.weights) @ np.exp(np.outer(node.s, q))
+    passed = node.passed * np.exp(node.gain * q) * node.gain ** orders[:, None]
+    for child in node.children:
+        passed = np.array(product(list(passed), list(_series(child, q))))
+    total: Floats = captured + passed
+    return total
+
+
+def _lost(found: Energies, n: int, place: float) -> float:
+    """Sum the lattice's masses, tilted by exp(place s), below s = 0, its point mass apart."""
+    lattice = Lattice(found.root, n, place)
+    norm, still = lattice.transform[0].real, lattice.still()
+    still_free = 0.0 if abs(found.s_nc) <= KEPT else found.p_nc
+    powers = (lattice.transform / norm) ** n - (still / norm) ** n - (still_free / norm) ** n
+    s = n * found.s_nc + lattice.places
+    # Gains above are as far as they were tilted up, and would be nothing but rounding, blown up.
+    near = s < 2 * lattice.step
+    untilt = np.exp(n * np.log(norm) - place * lattice.places[near])
+    captured = np.interp(0.0, s[near], cumulated(lattice.masses(powers)[near] * untilt))
+    return float(captured + (still_free**n if found.s_nc < 0 else 0.0))

@@ -28,8 +28,7 @@ from scene.transforms import backwards
 from theory.adiabatic import Captures, NotConverged, captures, refined, silent
 from theory.chebyshev import logarithm
 from theory.cycle import GUARD, Cycle
-from theory.precision import guarded
-from theory.validation import MAX_DIGITS, MAX_ORDER, one_of
+from theory.precision import MAX_DIGITS, MAX_ORDER, guarded, one_of
 from theory.volumes import as_mushroom
 
 MOST_RESOLUTIONS = 4

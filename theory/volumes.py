@@ -19,7 +19,7 @@ from scene.laws import Law, value
 from scene.refusal import BadInput, check_number, shown
 from scene.tables import Mushroom, Scene, check_scene
 from scene.transforms import scaled
-from theory.validation import check_real, in_system
+from theory.precision import check_real, in_system
 
 FAR = 100  # powers of two of a length or a time, beyond which others are taken for units
 WIDE = 0.75  # nu from which the island's share is summed as a series
@@ -41,19 +41,13 @@ class Volumes(NamedTuple):
 
 def v_cap(ctx: Any, r: Any) -> Any:
     """Return pi^2 r^2, the volume over the half disk of radius r [length]. Source: Eq:Vcap."""
-    return _over_cap(ctx, *in_system(ctx, r=r))
-
-
-def _over_cap(ctx: Any, r: Any) -> Any:
+    (r,) = in_system(ctx, r=r)
     return ctx.pi**2 * r * r
 
 
 def v_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
     """Return 2 pi (2 w h - h^2 slope), the volume over the stem. Source: Eq:Vcap."""
-    return _over_stem(ctx, *in_system(ctx, w=w, h=h, slope=slope))
-
-
-def _over_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
+    w, h, slope = in_system(ctx, w=w, h=h, slope=slope)
     return 2 * ctx.pi * (2 * w * h - h * h * slope)
 
 
@@ -128,10 +122,8 @@ def v_ell(ctx: Any, r: Any, nu: Any) -> Any:
 def v_cha(ctx: Any, r: Any, w: Any, h: Any, slope: Any) -> Any:
     """Return V_cap + V_stem - V_ell, the chaotic zone's volume. Source: vchs."""
     r, w, h, slope = in_system(ctx, r=r, w=w, h=h, slope=slope)
-    cap, stem = _over_cap(ctx, r), _over_stem(ctx, w, h, slope)
-    if not np.all(r > 0):
-        raise BadInput(f"r = {r}, must be > 0")
-    return cap * free_share(ctx, w / r) + stem
+    _check_positive("r", r)
+    return v_cap(ctx, r) * free_share(ctx, w / r) + v_stem(ctx, w, h, slope)
 
 
 def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
@@ -158,8 +150,7 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
     nu = at(mushroom.w) / r if mushroom.w is not None else at(mushroom.nu or 0.0)
     # A valid scene has nu <= 1: what exceeds it is rounding.
     nu = np.minimum(nu, 1.0) if ctx is np else min(nu, ctx.mpf(1))
-    # The numbers of a scene need no check.
-    cap, stem = _over_cap(ctx, r), _over_stem(ctx, nu * r, h, slope)
+    cap, stem = v_cap(ctx, r), v_stem(ctx, nu * r, h, slope)
     return Volumes(cap, stem, delta(ctx, nu) * cap, free_share(ctx, nu) * cap + stem, nu)
 
 

@@ -7,13 +7,11 @@ A check compares one number, or decides one statement. Its form is `claim` for w
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import theory
 from conformance.audit.runs import RUNS, Sample, Simulate, Size, scene_of
 from scene import Scene, load
-from theory.distribution import Energies
 
 if TYPE_CHECKING:
     from fast import Collisions, Flow
@@ -133,12 +131,6 @@ class AuditSteppers(NamedTuple):
     simulate: Simulate
     trajectory: Callable[..., Collisions]
     flow: Callable[..., Flow]
-
-
-@cache
-def energies_of(name: str) -> Energies:
-    """Return the theory's distribution of energies in a run's scene."""
-    return theory.energies(scene_of(RUNS[name]))
 
 
 class ClaimEvidence:

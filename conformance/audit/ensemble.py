@@ -26,7 +26,8 @@ from scipy.stats import ks_1samp
 
 import theory
 from conformance.audit.claim import Check
-from conformance.audit.claims.broadened import DRAWN_SEED, PEAK_DENSITY, Sums, peak_band
+from conformance.audit.claims.assumptions import walls_speed
+from conformance.audit.claims.finite_energy import DRAWN_SEED, PEAK_DENSITY, Sums, peak_band
 from conformance.audit.runs import MAX_LOST, BoolArray, FloatArray
 from conformance.audit.tolerances import (
     N_SIGMA,
@@ -35,6 +36,7 @@ from conformance.audit.tolerances import (
     critical_gap,
     fits,
     mean,
+    seen_late,
     share,
     spread,
     stated,
@@ -148,12 +150,6 @@ def cycle_start(scene: Mushroom) -> float:
     return float(theory.Cycle.of(scene, 10).start)
 
 
-def walls_speed(scene: Mushroom) -> float:
-    """Return the largest rate of a size over a cycle [length / time]."""
-    now = table_at(fp, scene, np.linspace(0.0, scene.period, N_TIMES + 1))
-    return max(float(np.max(np.abs(rate))) for rate in (now.r_rate, now.w_rate, now.h_rate))
-
-
 def nu_at(scene: Mushroom, times: FloatArray) -> FloatArray:
     """Return w / r at times."""
     return np.asarray(half_width(fp, scene, times) / values(scene.r, times))
@@ -265,9 +261,7 @@ def _capture_intervals(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     if len(t_in) < FEW:
         return
     wait = 2 * float(bounds(given.scene.r).highest) / math.sqrt(2 * given.energy)
-    grid = np.linspace(t_in.min(), t_in.max(), 2000)
-    seen = float(np.max(theirs.capture_cdf(grid) - theirs.capture_cdf(grid - wait)))
-    band = seen + theirs.theory_error.captured_mean
+    band = seen_late(theirs.capture_cdf, t_in, wait) + theirs.theory_error.captured_mean
     yield fits(TIMES, _some(t_in), theirs.capture_cdf, band=band, scale=0.4)
     if given.t_out is None:
         return

@@ -111,7 +111,7 @@ def diffusion(scene: Mushroom, t: float, n: int, seed: int) -> list[Mean]:
     kicks = np.diff(np.log(2 * energies), axis=1, prepend=0.0) / share
     turn = 2 * math.pi * np.arange(n_steps + 1) / n_steps
     speed = np.diff(np.sin(turn)) / (turn[1] - turn[0])
-    kicks -= kick_rates(scene, np.array([t]))[0] * STEP * speed
+    kicks -= kick_rates(scene, t) * STEP * speed
     groups = [_spectrum(part, speed) for part in np.array_split(kicks, N_GROUPS)]
     whole = _spectrum(kicks, speed)
     error = float(np.std([group.sum() for group in groups], ddof=1)) / N_GROUPS**0.5
@@ -164,7 +164,7 @@ def lag(
     done, _ = carry(table, found.states, [None] * len(found.states), TAIL, 1)
     ends = [o.vx**2 + o.vy**2 if isinstance(o, Horizon) else math.nan for o in done.outcomes]
     length = found.path + TAIL
-    excess = np.log(ends) / share + found.arcs * now.r_rate - kick_rates(scene, np.array([t]))[0] * length
+    excess = np.log(ends) / share + found.arcs * now.r_rate - kick_rates(scene, t) * length
     is_known = np.isfinite(excess)
     return mean(excess[is_known]), mean((excess**2 - rate * length)[is_known])
 
@@ -263,7 +263,7 @@ def depletion(scene: Mushroom, t: float, speed: float, n: int, seed: int) -> Mea
         turned(now, sigma, mouth, rate, np.random.default_rng([seed, 2]), longest).path
         for rate, longest in ((widening(now) / speed, path), (0.0, LAGS * STEP))
     )
-    missed = kick_rates(scene, np.array([t]))[0] + 2 * now.r_rate / now.r
+    missed = kick_rates(scene, t) + 2 * now.r_rate / now.r
     return mean(2 * missed**2 / chaotic * weight * (swayed(moving, path) - resting))
 
 
@@ -286,7 +286,7 @@ def measured(scene: Mushroom, *, phases: FloatArray = PHASES, n: float = 1.0, se
 
 
 def _row(scene: Mushroom, t: float, n: float, random: np.random.Generator) -> list[Mean]:
-    unit, now = float(pace(scene, np.array([t]))[0]), table_at(fp, scene, t)
+    unit, now = float(pace(scene, t)), table_at(fp, scene, t)
     first, second = random.integers(2**63, size=2).tolist()
     n_diffusing, n_lagging, n_waiting = (int(n * size) for size in (N_DIFFUSING, N_LAGGING, N_WAITING))
     spread = diffusion(scene, t, n_diffusing, first)

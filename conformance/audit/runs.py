@@ -71,7 +71,7 @@ _SWINGING = scenes.Fourier(1.0, 1.0, (), (0.3,))
 SCENES: dict[str, Scene] = {
     scene.name: scene
     for scene in (
-        # One parameter moves, the rest stand still (X7).
+        # One parameter moves, the rest stand still (X7, C12, C13).
         Mushroom(r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (0.4,)), slope=0.1111, name="only-mouth"),
         Mushroom(r=scenes.Fourier(1.0, 1.0, (-0.3,)), h=1.0, w=0.6, slope=0.1111, name="only-radius"),
         Mushroom(r=1.0, h=_SWINGING, nu=0.6, slope=0.1111, name="only-depth"),

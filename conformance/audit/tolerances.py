@@ -13,6 +13,7 @@ power of the test against it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from decimal import Decimal
 from typing import Any, NamedTuple
 
 import mpmath
@@ -79,6 +80,11 @@ def spread(values: npt.ArrayLike) -> Mean:
     variance = float(np.mean(centred**2))
     fourth = float(np.mean(centred**4)) - variance**2
     return Mean(float(x.std(ddof=1)), float(np.sqrt(max(fourth, 0.0) / x.size / max(4 * variance, 1e-300))))
+
+
+def half_unit(printed: str) -> float:
+    """Return half a unit of the last printed digit."""
+    return 0.5 * 10.0 ** int(Decimal(printed).as_tuple().exponent)
 
 
 def close(
@@ -172,6 +178,12 @@ def stated(what: str, holds: bool, found: str, expected: str, *, form: Form = "c
 def critical_gap(n: int) -> float:
     """Return the distance that n values of the right distribution exceed with probability LEVEL."""
     return float(kstwo.isf(LEVEL, n))
+
+
+def seen_late(cdf: Cdf, times: FloatArray, wait: float) -> float:
+    """Return how far the distribution of times moves, at most, if each may be seen by `wait` later."""
+    grid = np.linspace(times.min(), times.max(), 2000)
+    return float(np.max(cdf(grid) - cdf(grid - wait)))
 
 
 def chance(values: FloatArray, cdf: Cdf) -> float:

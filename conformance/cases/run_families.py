@@ -53,8 +53,7 @@ from conformance.cases.scenes import (
 from conformance.plain.step import Flight
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded
-from scene.given import MAX_KNOTS
-from scene.laws import bounds, is_constant
+from scene.laws import MAX_KNOTS, bounds, is_constant
 from scene.transforms import scaled, scaled_law, scaled_state
 
 WALLS: tuple[tuple[str, Wall], ...] = tuple(

@@ -31,8 +31,7 @@ from scene import (
     Wall,
 )
 from scene.geometry import TableAt, rounded
-from scene.given import MAX_KNOTS
-from scene.laws import bounds, breakpoints
+from scene.laws import MAX_KNOTS, bounds, breakpoints
 from scene.states import ON_WALL
 from scene.tables import laws
 from scene.transforms import scaled_law

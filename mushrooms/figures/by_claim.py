@@ -18,18 +18,20 @@ from matplotlib.figure import Figure
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claim import energies_of
-from conformance.audit.claims.broadened import (
+from conformance.audit.claims.exponents import nu_gap, zone_share
+from conformance.audit.claims.finite_energy import (
+    ACW,
+    CW,
     DRAWN_SEED,
+    ERGODIC,
+    LADDER,
     N_DRAWN,
-    adiabatic_limit,
+    fitted,
     predicted,
     summed,
     width,
     zone_energy,
 )
-from conformance.audit.claims.exponents import nu_gap, zone_share
-from conformance.audit.claims.finite_energy import ACW, CW, ERGODIC, LADDER, fitted
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import Mean, mean, share
@@ -150,7 +152,7 @@ def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
     bars = gathered(sample.gain, float(found.peak[1] ** 0.5))
     draw(axes, rest, bars, found)
     axes.set_title(f"{sample.run.scene}, E0 = {power(sample.run.energy)}, {sample.n:,} particles")
-    draw_adiabatic(axes, energies_of(sample.run.name), bars.edges, "sharp")
+    draw_adiabatic(axes, theory.energies(scene_of(sample.run)), bars.edges, "sharp")
 
 
 def capture_times(panels: Panels, *samples: Sample) -> None:
@@ -227,7 +229,7 @@ def stems(panels: Panels, tilted: Sample, upright: Sample) -> None:
     outline: dict[str, Any] = {"color": BLUE, "fill": False, "linewidth": 1.5}
     for panel, scale in zip(panels, ("linear", "log"), strict=True):
         for sample, label, style in ((tilted, "tilted stem", {}), (upright, "upright stem", outline)):
-            kept = sample.gain[~sample.captured] - float(adiabatic_limit(sample.run).log_e_nc)
+            kept = sample.gain[~sample.captured] - float(theory.predict(scene_of(sample.run)).log_e_nc)
             _bars(panel, kept, edges, baseline=1e-3, label=label, **style)
         gaussian = norm.pdf(edges, sigma**2 / 4, sigma)
         panel.plot(edges, gaussian, color=GREEN, linewidth=1.2, label="Gaussian, tilted stem's width")
@@ -244,7 +246,7 @@ SEED = 7
 def zone(panels: Panels, *samples: Sample) -> None:
     """Draw mean log E of the uncaptured and the share in the chaotic zone through the cycle."""
     for (left, right), sample in zip(panels, samples, strict=True):
-        times, means, _ = zone_energy(sample)
+        times, means = zone_energy(sample)
         span = times[0] / sample.run.phases[0]
         fine = np.linspace(0, span, 400)
         curve = theory.chaotic_zone(scene_of(sample.run), fine)

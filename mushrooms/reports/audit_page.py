@@ -15,8 +15,9 @@ import numba
 import numpy as np
 
 import scene as scenes
+import theory
 from conformance.audit.claim import Check, Claim, Finding
-from conformance.audit.claims.broadened import adiabatic_limit, predicted
+from conformance.audit.claims.finite_energy import predicted
 from conformance.audit.runs import Sample, run_seed, scene_of
 from conformance.audit.session import AuditResult
 from conformance.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, share, spread
@@ -193,7 +194,7 @@ def headline(samples: by_claim.Samples) -> list[Data]:
     for run, quantity, simulated_there, theory_there in MAIN:
         if run not in samples:
             continue
-        limit, here = adiabatic_limit(samples[run].run), predicted(samples[run])
+        limit, here = theory.predict(scene_of(samples[run].run)), predicted(samples[run])
         if quantity == M1:
             value, expected, found = float(limit.m1), here.mean_s, mean(samples[run].gain)
         else:

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from scene.refusal import BadInput, check_number
 from scene.tables import Scene
 from theory.branches import Floats
+from theory.precision import finite_array
 from theory.prediction import mean_of
-from theory.validation import finite_array
 
 ALIKE = 2.0**-46  # share of a term that the others leave: below it they leave rounding
 

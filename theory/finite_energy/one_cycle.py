@@ -1,7 +1,7 @@
 """Energies after one cycle at finite energy: the adiabatic theory with diffusion and shifts, nothing fitted.
 
 The chaotic zone's log E diffuses by the kicks of its walls, and the particles about to be captured, like
-those just released, lag behind the zone's mean. Both are known from frozen tables (`coefficients`). Beside
+those just released, lag behind the zone's mean. Both are known from frozen tables (`rates`). Beside
 its gain over the uncaptured a particle has a shift and a variance, of the orders v^-1 to v^(-2/3) and v^-1.
 Diffusion alone is exact: E^(1/4) is the distance from 0 of a Brownian motion in four dimensions, which
 is what keeping phase volume leaves of it. theory/equations.md derives all this and says what is left out.
@@ -19,11 +19,9 @@ from scipy.special import ndtr
 
 from scene.refusal import BadInput, check_count, check_number
 from scene.tables import Mushroom, Scene
-from theory.branches import Branch, Floats, Node, at, tree
-from theory.curves import chaotic_zone
-from theory.finite_energy.coefficients import N_TIMES, Fields, Flags, cycle_coefficients
-from theory.finite_energy.rates import SPEEDS, table_error
-from theory.validation import finite_array
+from theory.branches import Branch, Floats, Node, at, chaotic_zone, tree
+from theory.finite_energy.rates import N_TIMES, SPEEDS, Fields, Flags, cycle_coefficients, table_error
+from theory.precision import finite_array
 from theory.volumes import NotCovered, as_mushroom
 
 N_PLACES = 2000  # at which distribution functions are computed; linear between them
@@ -34,8 +32,6 @@ LATE = 16  # steps of a cycle, by which times may miss it: captures are seen fro
 REACH = 7.0  # standard deviations beyond which no kernel is computed
 LEAST = 1e-12  # variance of a kernel, in log E: a lag's square may leave less than none
 LARGEST = 2.0**1000  # of an energy: where its double is no float, fast particles seem slow
-TOO_SLOW = "energy = {}: walls turn too soon for particles so slow, and theory has no distribution"
-UNMEASURED = "energy = {}: particles so slow, below a speed of {:g}, are beyond the measured rates"
 MOST = 4.0  # variance of a kernel, in log E: beyond it what the peak has of it, v - v^2 / 8, falls again
 
 
@@ -115,10 +111,16 @@ class FiniteEnergy:
         with np.errstate(all="ignore"):  # lags as large as log E itself: refused below
             self._solve()
             if not self._fields.is_known:
-                raise NotCovered(UNMEASURED.format(energy, SPEEDS[0]))
+                raise NotCovered(
+                    f"energy = {energy}: particles so slow, below a speed of {SPEEDS[0]:g},"
+                    " are beyond the measured rates"
+                )
             is_one = self.point_masses.variance.max() < MOST and self.variance_s > 0 and self.peak[1] > 0
         if not is_one:
-            raise NotCovered(TOO_SLOW.format(energy))
+            raise NotCovered(
+                f"energy = {energy}: walls turn too soon for particles so slow,"
+                " and theory has no distribution"
+            )
         self._below: dict[str, tuple[Floats, Floats]] = {}
 
     def _solve(self) -> None:

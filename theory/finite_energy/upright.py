@@ -21,11 +21,10 @@ from scene.laws import breakpoints, is_constant, value
 from scene.refusal import BadInput, check_number
 from scene.tables import Scene, laws
 from theory.adiabatic import NotConverged
-from theory.branches import DIGITS, Floats
-from theory.curves import chaotic_zone
+from theory.branches import DIGITS, Floats, chaotic_zone
 from theory.cycle import Cycle
 from theory.finite_energy.rates import kick_rates
-from theory.validation import finite_array
+from theory.precision import finite_array
 from theory.volumes import NotCovered, as_mushroom, in_near_units, volumes_at
 
 # Panels of a cycle at first, cut at the laws' knots too; each is halved until its halves agree with it.

@@ -240,7 +240,7 @@ def speeds(evidence: ClaimEvidence) -> list[Check]:
 def _at_most_linear(evidence: ClaimEvidence, name: str) -> Check:
     """Check v_n - v_0 <= 2 u n, u the fastest wall: in the wall's frame a hit only turns the speed."""
     table = load(name)
-    fastest, share = _fastest_wall(table), -math.inf
+    fastest, share = walls_speed(table), -math.inf
     for x, y, turn in STARTS:
         start = State(0.0, x, y, 2 * fastest * math.cos(turn), 2 * fastest * math.sin(turn))
         done = evidence.steppers.trajectory(table, start, N_HITS, math.inf)
@@ -255,16 +255,13 @@ def _at_most_linear(evidence: ClaimEvidence, name: str) -> Check:
     )
 
 
-def _fastest_wall(table: object) -> float:
-    """Return a bound on the speed of any wall across itself: of arc, sides and floor."""
-    found = laws(table)  # type: ignore[arg-type]  # any table's
-    speed = {name: bounds(law).slope for name, law in found.items() if name in ("r", "h")}
-    if isinstance(table, Mushroom):
-        factors = [bounds(law) for law in width_factors(table)]
-        speed["w"] = float(
-            sum(f.slope * np.prod([g.highest for g in factors if g is not f]) for f in factors)
-        )
-    return float(max(speed.values()))
+def walls_speed(scene: Scene) -> float:
+    """Return a bound on the speed across itself of arc, floor and sides at the mouth [length / time]."""
+    speeds = [bounds(law).slope for name, law in laws(scene).items() if name in ("r", "h")]
+    if isinstance(scene, Mushroom):
+        factors = [bounds(law) for law in width_factors(scene)]
+        speeds.append(sum(f.slope * math.prod(g.highest for g in factors if g is not f) for f in factors))
+    return max(speeds)
 
 
 def _quadratic(sample: Sample) -> list[Check]:

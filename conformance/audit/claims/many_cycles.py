@@ -12,12 +12,11 @@ from scipy.stats import chi2, ncx2, norm
 
 import theory
 from conformance import profiles
-from conformance.audit.claim import Check, ClaimEvidence, energies_of
-from conformance.audit.claims.broadened import (
+from conformance.audit.claim import Check, ClaimEvidence
+from conformance.audit.claims.finite_energy import (
     DRAWN_SEED,
     N_DRAWN,
     PEAK_DENSITY,
-    adiabatic_limit,
     captured_band,
     predicted,
     summed,
@@ -108,13 +107,15 @@ def _sum_of(sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
             mean(drawn**3).value,
             band=N_SIGMA * mean(drawn**3).error,
         ),
-        stated(f"{label}: the tails are no Gaussian's, by theory", *_tails(sample.run.name, n, cumulants)),
+        stated(
+            f"{label}: the tails are no Gaussian's, by theory", *_tails(scene_of(sample.run), n, cumulants)
+        ),
     ]
 
 
-def _tails(run: str, n: int, cumulants: list[float]) -> tuple[bool, str, str]:
+def _tails(scene: Scene, n: int, cumulants: list[float]) -> tuple[bool, str, str]:
     """Weigh the tails of the adiabatic sums, those of high energies."""
-    sums, scale = theory.sum_of_cycles(energies_of(run), n), (n * cumulants[2]) ** 0.5
+    sums, scale = theory.sum_of_cycles(scene, n), (n * cumulants[2]) ** 0.5
     left, right = (float(sums.cdf(n * cumulants[1] + side * 3 * scale)) for side in (-1, 1))
     normal = float(norm.cdf(-3))
     ratios = left / normal, (1 - right) / normal
@@ -274,7 +275,7 @@ def radius_alone(evidence: ClaimEvidence) -> list[Check]:
 
 def _no_growth(sample: Sample) -> list[Check]:
     """Hold theory to m1 = 0, and particles to a mean of exp(-s/2) that finite energy does not bias."""
-    limit, kept = adiabatic_limit(sample.run), np.exp(-sample.gain[sample.takes_part] / 2)
+    limit, kept = theory.predict(scene_of(sample.run)), np.exp(-sample.gain[sample.takes_part] / 2)
     return [
         stated(f"{sample.run.name}: theory", limit.m1 == 0, f"m1 = {float(limit.m1):.1g}", "m1 = 0"),
         close(

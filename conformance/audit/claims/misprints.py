@@ -18,7 +18,7 @@ from mpmath import fp
 import scene as scenes
 import theory
 from conformance.audit.claim import DIGITS, Check, ClaimEvidence, Form
-from conformance.audit.claims.broadened import Figure, captured_change, less_bias
+from conformance.audit.claims.finite_energy import Figure, captured_change, less_bias
 from conformance.audit.runs import scene_of
 from conformance.audit.tolerances import close, exact, mean, stated
 from scene import State
@@ -53,11 +53,6 @@ def rounds_to(printed: str, value: Any) -> bool:
     number = Decimal(printed)
     exact = Decimal(mpmath.nstr(mpmath.mpf(value), 30, min_fixed=-mpmath.inf, max_fixed=mpmath.inf))
     return exact.quantize(number, ROUND_HALF_EVEN) == number
-
-
-def half_unit(printed: str) -> float:
-    """Return half a unit of the last printed digit."""
-    return 0.5 * 10.0 ** int(Decimal(printed).as_tuple().exponent)
 
 
 def half_angle(evidence: ClaimEvidence) -> list[Check]:

@@ -200,10 +200,6 @@ class CapturePiece(NamedTuple):
     capture: MonotoneStretch
     release: MonotoneStretch
 
-    def changed(self, change: Callable[[Any], Any]) -> CapturePiece:
-        """Return the piece with its numbers in another form."""
-        return CapturePiece(self.capture.changed(change), self.release.changed(change))
-
     @property
     def nu_upper(self) -> Any:
         """Largest nu of the piece."""

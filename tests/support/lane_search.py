@@ -14,10 +14,10 @@ from types import ModuleType
 
 import numpy as np
 
-from fast.batch import LaneRound, as_particle, residual, take_careful_steps
+from fast.batch import LaneRound, residual, take_careful_steps
 from fast.kernel import lanes, records
 from fast.kernel.fine_step import FineState, fine_path
-from fast.kernel.records import DEPTH, RATE, FloatArray
+from fast.kernel.records import DEPTH, RATE, FloatArray, Particle
 from scene import Scene
 from support.lane_anywhere import Group, Start, draw_anywhere
 from support.lane_draws import AIMS, draw_aimed
@@ -112,7 +112,7 @@ class Round(LaneRound):
 
     def is_floor_met_at_once(self, p: FloatArray) -> bool:
         """Tell whether a start is above the floor by no more than rounding, in pairs of floats, and falls."""
-        f, error = residual(as_particle(p, int(records.FLOOR)), self.compiled, self.anchors)
+        f, error = residual(Particle._make((*p.tolist(), int(records.FLOOR))), self.compiled, self.anchors)
         return bool(0.0 < f <= error and p[5] + self.anchors[DEPTH, RATE] < 0.0)
 
     def ulps(self, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray) -> float | None:

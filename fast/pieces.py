@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.kernel.arithmetic import MAX_QUADRANT, split
+from fast.kernel.arithmetic import HALF_PI, MAX_QUADRANT, split
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, PARABOLA, SERIES, TWO_WAVES, fill_pieces
 
 from fast.kernel.records import (  # isort: skip
@@ -31,7 +31,7 @@ from fast.kernel.records import (  # isort: skip
     OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled, FloatArray, LaneWaves,
     LawsInLanes, Pieces,
 )  # fmt: skip
-from fast.units import HALF_PI, compile_scene
+from fast.units import compile_scene
 from scene import Scene
 
 SHALLOW = 0.25  # of its mean: see `waves_of`

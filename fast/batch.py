@@ -43,7 +43,7 @@ def fill_lane(a, i, particle, age, worker):
     """Put a particle into a lane, its laws known from `age` before its time, if they still serve then."""
     for early in (age, 0.0):
         load(a, i, particle, False)
-        know_laws(a, i, early, worker.scene, worker.pieces, worker.degree, worker.waves)
+        know_laws(a, i, early, worker.laws)
         if a[records.END + i] > particle.t:
             break
     a[records.AS_GIVEN + i], a[records.STOP + i] = 0.0, np.inf
@@ -61,7 +61,7 @@ def step_lanes(pool, a, n, worker, spare):
                 if spare[records.TRIES] > MAX_CORRECTIONS:
                     break
                 t = spare[records.T] + spare[records.S]
-                set_reference(spare, 0, t, spare[records.T_LOW], worker.scene, worker.pieces, worker.degree)
+                set_reference(spare, 0, t, spare[records.T_LOW], worker.laws)
             if spare[records.END] == -np.inf:
                 break
             advance(pool, spare, 1, worker)

@@ -67,8 +67,15 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
     else:
         form = SERIES if (laws[:SHARED, KIND] == FOURIER).any() else PARABOLA
         pieces = pieces_of(compiled, form) or NO_PIECES
-    is_slope_moving, slope = bool(laws[SLOPE, KIND] != CONSTANT), float(laws[SLOPE, LEVEL])
-    return LawsInLanes(compiled, limits_of(compiled), pieces, waves or NO_WAVES, form, is_slope_moving, slope)
+    return LawsInLanes(
+        compiled,
+        limits_of(compiled),
+        pieces,
+        waves or NO_WAVES,
+        form,
+        is_slope_moving=bool(laws[SLOPE, KIND] != CONSTANT),
+        slope=float(laws[SLOPE, LEVEL]),
+    )
 
 
 def limits_of(scene: Compiled) -> LawLimits:

@@ -198,10 +198,11 @@ def follow_run(
 ) -> Ensemble:
     """Return what `fast.simulate` would, and follow only what the run's folder lacks."""
     spec = RunSpec(scene, energy, n_cycles, seed, phases)
-    line = spec.command(scene.name, n_particles, place)
     default = block_size(spec, n_particles, threads or os.cpu_count() or 1)
     with writable_folder(place), locked(place), named(place):
-        run = conduct.open_or_create(place, spec, n_particles, None, default, line, resume, at_least=True)
+        run = conduct.open_or_create(
+            place, spec, n_particles, None, default, scene.name, resume, at_least=True
+        )
         engine = partial(conduct.in_process, threads=threads)
         conduct.complete(run, engine, progress, n_particles=n_particles)
         return run.ensemble(n_particles)

@@ -77,10 +77,9 @@ def simulate_scene(
             engine = partial(conduct.by_dask, address=dask, threads=threads)
         limits: dict[str, Any] = {"max_collisions": max_collisions, "max_seconds": max_seconds}
         default = conduct.block_of_new(spec, particles, threads or os.cpu_count() or 1)
-        command = spec.command(scene, particles, out)
         with writable_folder(out), locked(out):
             with named(out), announce_compilation():
-                run = conduct.open_or_create(out, spec, particles, block, default, command, resume)
+                run = conduct.open_or_create(out, spec, particles, block, default, scene, resume)
             summary, gains = _on_disk(run, name, partial(conduct.complete, run, engine, **limits))
     print_pairs(summary, as_json)
     tell(careful_note(summary))

@@ -130,7 +130,7 @@ def _size(scene: Scene, t: float) -> tuple[float, float]:
 
 
 def careful_note(summary: Mapping[str, Any]) -> str | None:
-    """Return a line on careful steps if a run took a second of one core, a tenth of it for them, or more.
+    """Return a line on careful steps, if a run took a second of one core and they took over a tenth of it.
 
     Args:
         summary: as `mushrooms simulate` prints it.

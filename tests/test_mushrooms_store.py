@@ -29,10 +29,11 @@ from mushrooms.store import conduct
 from mushrooms.store import run as stored
 from mushrooms.store.run import DESCRIPTION, DIGESTED, StoredRun
 from mushrooms.store.spec import LANES, SCHEMA, RunSpec, paused_of, shape_of
-from scene import load
+from scene import load, to_data
 
 pytestmark = pytest.mark.usefixtures("unsynced")
 N, ENERGY, SEED = 330, 40.0, 7
+STEM = to_data(load("fermi-ulam"))
 
 
 def arguments(folder, *more, n=N, block=64, name="fermi-ulam"):
@@ -242,6 +243,8 @@ def test_one_writer_holds_a_folder(command_line, tmp_path, whole):
         ({"schema": 0}, ["--resume"], [f"schema = 0 there, {SCHEMA} asked for"]),
         ({"version": "0.0.9"}, ["--resume"], ["version = '0.0.9' there", repr(mushrooms.__version__)]),
         ({"scene": {"table": "stem"}}, ["--resume"], ["scene: ", "= None there"]),
+        ({"scene": STEM | {"w": {"mean": 1.0}}}, ["--resume"], ["scene: w = {'mean': 1.0} there, 1.0 asked"]),
+        ({"scene": STEM | {"h": {**STEM["h"], "mean": 9.0}}}, ["--resume"], ["scene: h: mean = 9.0 there"]),
     ],
 )
 def test_another_run_in_the_folder_is_refused(command_line, finished, change, options, words):

@@ -214,8 +214,11 @@ def shape_of(spec: RunSpec, n_particles: int, block: int, chunked: int | None = 
 
 def columns(paused: Paused) -> Arrays:
     """Return the arrays that are stored of an ensemble."""
-    found = paused.ensemble._asdict()
-    found |= {"lanes": paused.lanes, "takes_part": paused.ensemble.takes_part()}
+    found = {
+        **paused.ensemble._asdict(),
+        "lanes": paused.lanes,
+        "takes_part": paused.ensemble.takes_part(),
+    }
     return {name: found[name].astype(field.kind, copy=False) for name, field in FIELDS.items()}
 
 

@@ -11,7 +11,6 @@ import mpmath
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from mpmath import fp
 from msgspec.structs import replace
 from support.tables import BOX, CIRCLE, STATIC
@@ -23,7 +22,6 @@ import reference.path
 from conformance.cases.certify import measured_step
 from conformance.grading.agreement import compare
 from conformance.strategies import scenes_and_states
-from reference.rational import law_jet
 from scene import (
     BadInput,
     BangBang,
@@ -264,23 +262,6 @@ def test_margins_near_the_corner_of_arc_and_base(near):
     found = margins_of(CIRCLE, State(0, 0.5, 0.5, 0.5, -0.5 - near))
     assert float(found.corner) == pytest.approx(near, rel=0.02)
     assert 0 < float(found.gap) < 5 * near
-
-
-FACTORS = st.lists(st.integers(-2, 2), min_size=1, max_size=6).map(tuple)
-
-
-@given(st.integers(-2, 2), FACTORS, FACTORS, st.fractions(0, 1, max_denominator=30))
-def test_a_law_and_its_rates_are_0_exactly_when_their_numbers_are(mean, cos, sin, time):
-    law = Fourier(float(mean), period=1.0, cos=cos, sin=sin)
-    with mpmath.workdps(60):
-        t = mpmath.mpf(time.numerator) / time.denominator
-        numbers = [mean + 0 * t, 0 * t, 0 * t]
-        for k, a, b in law.harmonics():
-            c, s, rate = mpmath.cospi(2 * k * t), mpmath.sinpi(2 * k * t), 2 * mpmath.pi * k
-            waves = a * c + b * s, rate * (b * c - a * s), -(rate**2) * (a * c + b * s)
-            numbers = [number + wave for number, wave in zip(numbers, waves, strict=True)]
-        for found, number in zip(law_jet(law, time), numbers, strict=True):
-            assert found.is_zero() == (abs(number) < mpmath.mpf(10) ** -50)
 
 
 FROM_THE_CAP = State(0.3, 0.1, 0.2, 3.0, 4.0)

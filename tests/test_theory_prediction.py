@@ -197,21 +197,37 @@ def plateau_scene() -> Scene:
     return Mushroom(r=1.0, w=w, h=h, slope=0.0625)
 
 
-def test_a_figure_that_is_0_is_told_as_0():
-    """The mouth narrows twice while the radius rests: the gains of particles never captured cancel."""
-    r = ((0.0, 1.0), (2.0, 1.0), (2.5, 1.25), (6.0, 1.25), (6.5, 1.0), (8.0, 1.0))
-    nu = tuple(enumerate((1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0)))
-    found = predict(Mushroom(r=BangBang(r), h=1.0, nu=BangBang(nu), slope=0.1), 6)
-    assert (found.log_e_nc, found.strings(6)["m1"]) == (0, "0.00360974")
+# The mouth narrows twice while the radius rests: the gains of particles never captured cancel.
+CANCELLING = Mushroom(
+    r=BangBang(((0.0, 1.0), (2.0, 1.0), (2.5, 1.25), (6.0, 1.25), (6.5, 1.0), (8.0, 1.0))),
+    h=1.0,
+    nu=BangBang(tuple(enumerate((1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0)))),
+    slope=0.1,
+)
+# Gains are below the first target, so that its parts are too wide near where the mouth nearly turns.
+HARDLY_MOVING = Mushroom(
+    r=Fourier(mean=1.0, omega=1.0, sin=(1e-17,)),
+    h=Fourier(mean=1.0, omega=1.0, cos=(5e-18,), sin=(0.0, -1e-17)),
+    nu=Fourier(mean=0.5, omega=1.0, cos=(0.3, 0.075075), sin=(0.01,)),
+    slope=0.03,
+)
 
 
-def test_walls_that_hardly_move_are_resolved_as_well_as_others():
-    """Gains are below the first target, so that its parts are too wide near where the mouth nearly turns."""
-    r = Fourier(mean=1.0, omega=1.0, sin=(1e-17,))
-    h = Fourier(mean=1.0, omega=1.0, cos=(5e-18,), sin=(0.0, -1e-17))
-    nu = Fourier(mean=0.5, omega=1.0, cos=(0.3, 0.075075), sin=(0.01,))
-    found = predict(Mushroom(r=r, h=h, nu=nu, slope=0.03)).strings(15)
-    assert (found["m1"], found["sd"]) == ("3.02583701397630e-35", "7.77925062454772e-18")
+@pytest.mark.parametrize(
+    ("scene", "digits", "expected"),
+    [
+        (CANCELLING, 6, {"log_e_nc": "0.0", "m1": "0.00360974"}),
+        (HARDLY_MOVING, 15, {"m1": "3.02583701397630e-35", "sd": "7.77925062454772e-18"}),
+        (load("moving-cap"), 20, {"p_nc": "0.38474274657330507638", "log_e_nc": "-0.42246543129115702037"}),
+        (load("moving-cap"), 1, {"mean_exp_plus": "1"}),
+    ],
+)
+def test_figures_are_told_in_the_digits_asked(scene, digits, expected):
+    found = predict(scene, digits)
+    strings = found.strings(digits)
+    assert list(strings) == ["p_nc", "m1", "log_e_nc", "sd", "mean_exp_minus", "mean_exp_plus"]
+    assert {name: strings[name] for name in expected} == expected
+    assert found.sd_of_mean(4) == found.sd / 2
 
 
 def test_a_plateau_within_the_capture_splits_the_integrals() -> None:
@@ -285,16 +301,6 @@ def test_digits_out_of_reach_are_refused_not_guessed() -> None:
     nu = BangBang(((0.0, 1.0), (1.0, 1e-30), (2.0, 1.0)))
     with pytest.raises(NotConverged, match=r"closes to 1\.0e-30 of its widest, must stay above 1e-20 of it"):
         predict(Mushroom(r=1.0, h=1.0, nu=nu), digits=5)
-
-
-def test_strings_have_the_digits_asked() -> None:
-    found = predict(load("moving-cap"), digits=20)
-    strings = found.strings(20)
-    assert list(strings) == ["p_nc", "m1", "log_e_nc", "sd", "mean_exp_minus", "mean_exp_plus"]
-    assert strings["p_nc"] == "0.38474274657330507638"
-    assert strings["log_e_nc"] == "-0.42246543129115702037"
-    assert found.strings(1)["mean_exp_plus"] == "1"
-    assert found.sd_of_mean(4) == found.sd / 2
 
 
 def test_knots_may_start_anywhere_in_the_period() -> None:

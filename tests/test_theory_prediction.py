@@ -11,7 +11,7 @@ from mpmath import MPContext, fp
 from support.depth import deep_among, deep_but
 
 import theory
-from scene import BangBang, Fourier, Mushroom, Scene, exact, load
+from scene import BangBang, Fourier, Mushroom, exact, load
 from scene.laws import values
 from theory import (
     Cycle,
@@ -193,13 +193,13 @@ def test_a_loop_too_thin_for_binary64_still_has_its_growth_rate() -> None:
     assert abs(growth(2.0**-40) / growth(2.0**-41) - 4) < 1e-9
 
 
-def plateau_scene() -> Scene:
-    """W falls 1 -> 0.625, rests while h falls 4 -> 2, falls to 0.25, and rises at h = 2."""
-    w = BangBang(knots=((0.0, 1.0), (1.0, 0.625), (2.0, 0.625), (3.0, 0.25), (4.0, 1.0), (5.0, 1.0)))
-    h = BangBang(knots=((0.0, 4.0), (1.0, 4.0), (2.0, 2.0), (4.0, 2.0), (5.0, 4.0)))
-    return Mushroom(r=1.0, w=w, h=h, slope=0.0625)
-
-
+# w falls 1 -> 0.625, rests while h falls 4 -> 2, falls to 0.25, and rises at h = 2.
+PLATEAU = Mushroom(
+    r=1.0,
+    w=BangBang(((0.0, 1.0), (1.0, 0.625), (2.0, 0.625), (3.0, 0.25), (4.0, 1.0), (5.0, 1.0))),
+    h=BangBang(((0.0, 4.0), (1.0, 4.0), (2.0, 2.0), (4.0, 2.0), (5.0, 4.0))),
+    slope=0.0625,
+)
 # The mouth narrows twice while the radius rests: the gains of particles never captured cancel.
 CANCELLING = Mushroom(
     r=BangBang(((0.0, 1.0), (2.0, 1.0), (2.5, 1.25), (6.0, 1.25), (6.5, 1.0), (8.0, 1.0))),
@@ -245,7 +245,7 @@ def test_a_plateau_within_the_capture_splits_the_integrals() -> None:
 
     A = spent(4, 1, 0.625) + spent(2, 0.625, 0.25)
     B = spent(2, 1, 0.25)
-    found = predict(plateau_scene(), digits=18)
+    found = predict(PLATEAU, digits=18)
     assert abs(found.p_nc - ctx.exp(-A)) < 1e-18
     assert abs(found.log_e_nc - (B - A)) < 1e-18
     assert abs(found.mean_exp_minus - 1) < 1e-18

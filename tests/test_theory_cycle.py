@@ -105,8 +105,6 @@ def test_bang_bang_width_and_radius_turn_between_knots() -> None:
     w = BangBang(knots=((0.0, 0.5), (1.0, 0.75), (3.0, 0.5)))
     r = BangBang(knots=((0.0, 1.0), (2.0, 1.5), (3.0, 1.0)))
     cycle = Cycle.of(Mushroom(r=r, h=1.0, w=w), 15)
-    motion = [s.motion for p in cycle.pieces for s in (p.capture, p.release)]
-    assert motion
     sampled = [value(cycle.ctx, w, k / 512) / value(cycle.ctx, r, k / 512) for k in range(1536)]
     assert max(sampled) <= cycle.nu_max < max(sampled) + 1e-4
     assert min(sampled) - 1e-4 < cycle.nu_min <= min(sampled)

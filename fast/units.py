@@ -12,8 +12,6 @@ least of all floats, beside a table of common size, comes in exactly too. `compi
 the numbers that the kernels read.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from fractions import Fraction

@@ -12,8 +12,6 @@ its own, and no more than a third as far off as theory's.
 Not handled: starts of several energies, tables other than mushrooms.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress

@@ -15,8 +15,7 @@ from reference.course import Course, Hit
 from reference.jacobian import Matrix, chained, enclosures, identity, step_jacobian
 from reference.start import depart
 from reference.step import GUARD_DIGITS, MAX_DIGITS, checked_digits, require_digits
-from scene import Scene, State, Undecided, Undefined
-from scene.refusal import check_count, check_number
+from scene import Scene, State, Undecided, Undefined, check_count, check_number
 from scene.states import check_numbers
 
 MAX_COLLISIONS = 1_000_000

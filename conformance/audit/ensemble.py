@@ -40,10 +40,9 @@ from conformance.audit.tolerances import (
     stated,
     steepest,
 )
-from scene import Mushroom
+from scene import BadInput, Mushroom
 from scene.geometry import half_width, table_at
 from scene.laws import bounds, values
-from scene.refusal import BadInput
 from scene.transforms import backwards
 from theory.finite_energy.one_cycle import TheoryError
 

@@ -33,6 +33,8 @@ particle by particle, give one number in [0, 1] of mean 1/2. The alternative is 
 directions are alike.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from math import log, pi, prod, sqrt
 from typing import NamedTuple

@@ -26,6 +26,8 @@ each output. How far that moves the answer, to first order, follows from the ans
 Where a nudge changes the outcome or the wall, the question is delicate and nothing is said about it.
 """
 
+from __future__ import annotations
+
 import json
 import math
 from collections.abc import Callable, Sequence

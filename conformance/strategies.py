@@ -5,6 +5,8 @@ with random bits from Hypothesis. Shrinking leads to questions with few and shor
 the failing step is printed as a line of the protocol.
 """
 
+from __future__ import annotations
+
 import json
 from functools import cache
 

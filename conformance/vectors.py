@@ -25,6 +25,8 @@ enclosures or levels of published vectors change. Results with the same MAJOR ar
 Not handled: questions that JSON or `scene.State` cannot represent (nan, missing or unknown fields).
 """
 
+from __future__ import annotations
+
 import decimal
 import hashlib
 import json

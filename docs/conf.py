@@ -5,8 +5,6 @@ makes every broken reference an error, and because autodoc shows signatures as t
 MathML when the site is built: a browser needs neither scripts nor a network for them.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import sys
@@ -24,16 +22,14 @@ sys.path.insert(0, str(ROOT))
 about = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 REPOSITORY = about["urls"]["Repository"] + "/blob/main/"
 
-project = "Oscillating Mushrooms"
-author = about["authors"][0]["name"]
+project = html_title = "Oscillating Mushrooms"
+author = copyright = about["authors"][0]["name"]
 version = release = about["version"]
-copyright = author
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["generated", "scoreboard.md"]  # included, or tables by commands
 html_theme = "furo"
-html_title = "Oscillating Mushrooms"
 html_static_path = ["site.css"]
 html_css_files = ["site.css"]
 html_search_scorer = str(DOCS / "search.js")
@@ -51,7 +47,11 @@ autodoc_member_order = "bysource"
 napoleon_use_ivar = True
 napoleon_attr_annotations = False  # the signature has them
 autodoc_type_aliases = {
-    name: name for name in ("FloatArray", "IntArray", "BoolArray", "Floats", "Law", "Scene")
+    name: name
+    for name in (
+        *("ArrayLike", "BoolArray", "FloatArray", "Floats", "Gains", "IntArray"),
+        *("Flowing", "Follow", "Law", "Outcome", "Question", "Scene", "Stepper", "Wall"),
+    )
 }
 copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
@@ -110,6 +110,13 @@ def _plain(line: str) -> str:
     return "".join(parts)
 
 
+def bare_alias(
+    app: Any, what: str, name: str, obj: Any, options: Any, arguments: str | None, answer: str | None
+) -> list[str | None]:
+    """Write an alias inside a union as one that stands alone: Sphinx shows its own class there."""
+    return [text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) for text in (arguments, answer)]
+
+
 def no_alias(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
     """Leave out what only repeats a class's own list of attributes."""
     return True if (getattr(obj, "__doc__", "") or "").startswith("Alias for field") else None
@@ -165,5 +172,6 @@ def setup(app: Any) -> None:
     app.connect("source-read", in_the_repository)
     app.connect("include-read", included)
     app.connect("autodoc-process-docstring", plain_docstring, priority=400)  # before napoleon
+    app.connect("autodoc-process-signature", bare_alias)
     app.connect("autodoc-skip-member", no_alias)
     app.connect("build-finished", copy_reports)

@@ -8,6 +8,8 @@ Particle i draws its start from block i of a counter-based random stream (Philox
 same particle whatever the number of particles, threads or chunks.
 """
 
+from __future__ import annotations
+
 import hashlib
 import math
 import time
@@ -21,7 +23,7 @@ from mpmath import fp
 from fast.kernel import records
 from fast.kernel.arithmetic import directions
 from fast.kernel.follow import LANE_ROWS, follow_particles
-from fast.kernel.records import FloatArray, Followed, IntArray, LawsInLanes, Stops, unfilled_ends
+from fast.kernel.records import BoolArray, FloatArray, Followed, IntArray, LawsInLanes, Stops, unfilled_ends
 from fast.kernel.single import LARGEST
 from fast.kernel.worker import awaited, interruptible, is_known_throughout, new_worker
 from fast.pieces import laws_in_lanes
@@ -89,16 +91,16 @@ class Ensemble(NamedTuple):
     t_out: FloatArray
     wall_counts: IntArray
     phase_energies: FloatArray
-    phase_captured: npt.NDArray[np.bool_]
+    phase_captured: BoolArray
     n_careful: IntArray
     seconds: float
     threads: int
 
-    def is_captured(self) -> npt.NDArray[np.bool_]:
+    def is_captured(self) -> BoolArray:
         """Return (N, K): whether a particle has a capture interval in a cycle."""
         return np.asarray(np.isfinite(self.t_in).any(axis=2))
 
-    def takes_part(self) -> npt.NDArray[np.bool_]:
+    def takes_part(self) -> BoolArray:
         """Return (N,): whether a particle was followed to the end and was free at some time.
 
         If nu is always below 1, some particles are never free. Every entry of their t_in is a number, their
@@ -106,11 +108,11 @@ class Ensemble(NamedTuple):
         particle may be released and not reach the stem before the end: it takes part. If it is captured
         again before the end, it looks as if it had never been free.
         """
-        was_followed: npt.NDArray[np.bool_] = self.outcome == FOLLOWED
+        was_followed: BoolArray = self.outcome == FOLLOWED
         if self.t_in.shape[2] == 0:
             return was_followed
         is_always_in = np.isfinite(self.t_in).all(axis=(1, 2)) & ~self.wall_counts[:, 2:].any(axis=1)
-        is_on_at_the_end: npt.NDArray[np.bool_] = self.t_out[:, -1, -1] == self.t
+        is_on_at_the_end: BoolArray = self.t_out[:, -1, -1] == self.t
         return was_followed & ~(is_always_in & is_on_at_the_end)
 
     def p_nc(self) -> FloatArray:

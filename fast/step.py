@@ -1,5 +1,7 @@
 """The fast stepper: one step, and the form of states and outcomes in the kernels."""
 
+from __future__ import annotations
+
 import sys
 from collections.abc import Iterable, Sequence
 

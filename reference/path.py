@@ -4,6 +4,8 @@ All steps are taken at one working precision; when the last state is not enclose
 the whole trajectory begins again at twice that. What is claimed, and why it follows: docs/proof.md.
 """
 
+from __future__ import annotations
+
 import sys
 from dataclasses import replace
 from fractions import Fraction

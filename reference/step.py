@@ -4,6 +4,8 @@
 `Undecided`. What is claimed, and why it follows: docs/proof.md. Many steps: `reference.path`.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 from fractions import Fraction
 

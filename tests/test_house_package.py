@@ -12,6 +12,10 @@ from pathlib import Path
 
 import pytest
 
+import fast
+import reference
+import theory
+from conformance import properties
 from conformance.cases.corpus import archive
 from conformance.vectors import manifest
 
@@ -120,6 +124,20 @@ def published_readme(text: str) -> str:
 def test_every_package_says_that_it_is_typed():
     for package in PYPROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]:
         assert (ROOT / package / "py.typed").is_file()
+
+
+@pytest.mark.parametrize(
+    ("function", "argument", "name"),
+    [
+        (fast.simulate, "scene", "Scene"),
+        (reference.next_collision, "scene", "Scene"),
+        (theory.energy_cdf, "s", "ArrayLike"),
+        (properties.check_mirror, "stepper", "Stepper"),
+    ],
+)
+def test_signatures_name_their_types(function, argument, name):
+    """Evaluated, an alias shows in help() and on the pages as the long union that it stands for."""
+    assert function.__annotations__[argument] == name
 
 
 def test_the_published_readme_has_no_relative_link():

@@ -1,7 +1,5 @@
 """`mushrooms audit`: a report that is complete, stands alone and goes on; its runs on disk are taken up."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """The commands check, ask, verify and bench: exit codes, what is printed and written, and what is refused."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

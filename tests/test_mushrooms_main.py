@@ -1,7 +1,5 @@
 """The command line: results as promised, how a command ends, the manners of all commands, odd scenes."""
 
-from __future__ import annotations
-
 import errno
 import io
 import json

@@ -29,7 +29,7 @@ from mushrooms.figures import by_claim
 from mushrooms.output import locked
 from mushrooms.reports import audit_page
 from mushrooms.store import conduct
-from mushrooms.store.run import StoredRun, attributes_of
+from mushrooms.store.run import attributes_of
 
 pytestmark = pytest.mark.usefixtures("unsynced")
 FIGURES = ("X1", "X5", "L4")
@@ -369,23 +369,6 @@ def test_a_run_is_held_while_the_audit_follows_it(command_line, tmp_path, monkey
     monkeypatch.setattr(fast, "go_on", meanwhile)
     assert kept(tmp_path, run).n_particles == N_QUICK
     assert_refused(refused[0], "one run at a time")
-
-
-ensemble = StoredRun.ensemble
-
-
-def cut_off(run, n):
-    """Read whole blocks."""
-    return ensemble(run, min(-(-n // run.shape.block) * run.shape.block, run.tally.particles))
-
-
-@pytest.mark.usefixtures("followed")
-def test_a_run_read_in_whole_blocks_is_found_out(tmp_path, monkeypatch):
-    run = SMALL["mouth"]
-    monkeypatch.setattr(StoredRun, "ensemble", cut_off)
-    sizes = ("quick", "full", "quick")
-    found = [kept(tmp_path, run, size).sha256 for size in sizes]
-    assert found != [at_once(run, size).sha256 for size in sizes]
 
 
 def test_the_commands_of_an_audit_make_its_runs(command_line, tmp_path, monkeypatch):

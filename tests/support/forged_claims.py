@@ -2,9 +2,9 @@
 
 Each forgery is a function of a stream of random numbers and a line that holds. It returns a line that is
 false, or None where it cannot be sure of that; its docstring says why the line is false. One reason serves
-most: a question has one answer, so what contradicts a true claim is false. Later roots, wrong physics, and
-questions that must be refused, are forged elsewhere: by faulty references under attack, and by weaker
-verifiers.
+most: a question has one answer, so what contradicts a true claim is false. Later roots, wrong physics,
+questions that must be refused, exchanged ends and further answers are forged elsewhere: by faulty references
+under attack, and by weaker verifiers.
 """
 
 import json
@@ -82,14 +82,6 @@ def move(exponent: int, random: Random, line: Line) -> Line | None:
     return forged if true[0] > ends(step, name)[1] or ends(step, name)[0] > true[1] else None
 
 
-def exchange_ends(random: Random, line: Line) -> Line | None:
-    """Exchange the ends of an enclosure: no number is above the greater and below the lesser."""
-    forged = plain(line)
-    step, name = random.choice(forged["expect"][0]["steps"]), random.choice(NUMBERS)
-    step[name].reverse()
-    return forged if ends(step, name)[0] > ends(step, name)[1] else None
-
-
 def rename_wall(random: Random, line: Line) -> Line | None:
     """Name another wall: where a hit is proved, no other wall is met."""
     forged = plain(line)
@@ -159,19 +151,6 @@ def miscount(random: Random, line: Line) -> Line | None:
     return {**line, "collisions": count} if count > 0 else None
 
 
-def permit_refusal(random: Random, line: Line) -> Line:
-    """Permit a refusal at level core, where an answer is proved and within reach: beside it, or alone."""
-    refusal = {"outcome": random.choice(("rejected", "undecided"))}
-    return {**line, "expect": random.choice(([refusal], [*line["expect"], refusal]))}
-
-
-def permit_falsehood(random: Random, line: Line) -> Line | None:
-    """Permit a false answer beside the true one."""
-    forge: Forge = random.choice((partial(move, 0), rename_wall, exchange_ends, call_undefined))
-    forged = forge(random, line)
-    return {**line, "expect": [*line["expect"], *forged["expect"]]} if forged else None
-
-
 def spoil(random: Random, line: Line) -> Line:
     """Give a field another type: what is left is no claim."""
     forged = plain(line)
@@ -187,7 +166,6 @@ KINDS: dict[str, tuple[str, Forge]] = {
     "a number moved by widths": ("answered", partial(move, 0)),
     "a number moved by some 1e-15": ("answered", partial(move, 8)),
     "a number moved far": ("answered", partial(move, 22)),
-    "the ends of an enclosure exchanged": ("answered", exchange_ends),
     "another wall named": ("answered", rename_wall),
     "a hit missed": ("hit", miss),
     "a hit after t_end": ("hit", meet_too_late),
@@ -202,8 +180,6 @@ KINDS: dict[str, tuple[str, Forge]] = {
     "a capture interval dropped": ("stays", partial(change_stays, "drop")),
     "a capture interval added": ("flow", partial(change_stays, "add")),
     "steps of a flow miscounted": ("flow", miscount),
-    "a refusal permitted": ("core", permit_refusal),
-    "a false answer permitted": ("step", permit_falsehood),
     "a field spoiled": ("answered", spoil),
 }
 POOLS: dict[str, Callable[[Line, Line], object]] = {
@@ -217,7 +193,6 @@ POOLS: dict[str, Callable[[Line, Line], object]] = {
     "rejected": lambda line, answer: (
         answer["outcome"] == "rejected" and line["scene"].get("table") in verify.WALLS
     ),
-    "core": lambda line, answer: line["level"] == "core" and len(line["expect"]) == 1 and answer.get("steps"),
 }
 
 

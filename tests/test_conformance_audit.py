@@ -25,7 +25,6 @@ from conformance.audit.claims import (
 )
 from conformance.audit.frozen import (
     MEASURED,
-    SEED,
     measured,
     passages,
 )
@@ -343,34 +342,16 @@ def test_the_power_of_a_distributions_test_is_no_more_than_it_has(shift):
     assert claimed >= refuted - 0.35  # a bound from one place, not far from the truth
 
 
-N = 0.5  # of the table's particles
-FEW = [8, 40]  # of PHASES: the mouth narrows at one and widens at the other
-MOVING = load("fixed-cap-anticlockwise")
-PULL = 6.0  # errors of sums are those of eight groups, so that such pulls are rare but not unheard of
+ROUNDING = 0.5 * 10 ** (1 - frozen.DIGITS)  # of the table's numbers, relative to one that begins with 1
 
 
-def pulls(ours: Rates, table: Rates) -> np.ndarray:
-    """Return differences over their standard errors; the table's were estimated with their numbers."""
-    whole, found = (
-        [rates._replace(diffusion=rates.diffusion.sum(axis=1, keepdims=True)) for rates in (ours, table)],
-        [],
-    )
-    for value, error in ((0, 4), (1, 5), (2, 6), (3, 7)):
-        mine, its = whole[0][error], whole[1][error][FEW]
-        if not value:  # of the sum of all memories
-            mine, its = (column.sum(axis=1, keepdims=True) for column in (mine, its))
-        found.append((whole[0][value] - whole[1][value][FEW]) / np.hypot(mine, its))
-    return np.concatenate([f.ravel() for f in found])
-
-
-@pytest.fixture(scope="module")
-def anew() -> Rates:
-    return measured(MOVING, phases=PHASES[FEW], n=N, seed=SEED + 1)
-
-
-def test_entries_measured_anew_agree_with_the_table(anew: Rates) -> None:
-    table, _ = frozen_rates(MOVING)
-    assert np.abs(pulls(anew, table)).max() < PULL
+def is_measured_again(table: Rates, name: str, n: float, phase: int) -> bool:
+    """Tell whether the table's seed gives its entries at a phase again, to the digits that it keeps."""
+    scene = load(name)
+    assert isinstance(scene, Mushroom)
+    again = measured(scene, phases=PHASES[[phase]], n=n)
+    pairs = zip(again, table, strict=True)
+    return all(np.allclose(mine, its[[phase]], rtol=ROUNDING, atol=0.0) for mine, its in pairs)
 
 
 @pytest.mark.parametrize(
@@ -382,21 +363,16 @@ def test_entries_measured_anew_agree_with_the_table(anew: Rates) -> None:
     ],
 )
 def test_the_tables_seed_gives_its_entries_again(name: str, n: float, phase: int) -> None:
-    scene = load(name)
-    assert isinstance(scene, Mushroom)
-    table, _ = frozen_rates(scene)
-    rounding = 0.5 * 10 ** (1 - frozen.DIGITS)  # of the table's numbers, relative to one that begins with 1
-    for again, entries in zip(measured(scene, phases=PHASES[[phase]], n=n), table, strict=True):
-        assert np.allclose(again, entries[[phase]], rtol=rounding, atol=0.0)
+    table, _ = frozen_rates(load(name))
+    assert is_measured_again(table, name, n, phase)
 
 
-@pytest.mark.parametrize(
-    ("field", "factor"), [("diffusion", 1.5), ("lag", 1.3), ("lag", -1.0), ("square", 8.0)]
-)
-def test_a_wrong_table_is_found_out(anew: Rates, field: str, factor: float) -> None:
-    table, _ = frozen_rates(MOVING)
-    wrong = table._replace(**{field: getattr(table, field) * factor})
-    assert np.abs(pulls(anew, wrong)).max() > PULL
+@pytest.mark.parametrize("field", Rates._fields)
+def test_a_wrong_table_is_found_out(field: str) -> None:
+    name = "fixed-cap-anticlockwise"
+    table, _ = frozen_rates(load(name))
+    wrong = table._replace(**{field: getattr(table, field) * 1.0003})
+    assert not is_measured_again(wrong, name, 1.0, 8)
 
 
 def test_the_table_holds_what_the_command_measures() -> None:

@@ -34,7 +34,7 @@ PYTHON = [sys.executable, str(Path(conformance.__file__).parent / "harness" / "p
 
 @pytest.fixture(autouse=True)
 def _few(monkeypatch):
-    """A handful of vectors of every kind, and few properties."""
+    """A handful of vectors of every kind, and few properties; two workloads, and a few questions."""
     found = [v for v in vectors.load("core") if v.group in ("moving-cap", "stem-trajectory", "near-corner")][
         ::6
     ]
@@ -43,6 +43,11 @@ def _few(monkeypatch):
     monkeypatch.setitem(flows.SIZES, "core", flows.Size(20, 50.0, 0.5))
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
     monkeypatch.setattr(output, "FIRST", math.inf)
+    monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1] + workloads.RULES[2:3])
+    monkeypatch.setattr(bench, "QUESTIONS", {"quick": 2, "full": 64})
+    monkeypatch.setattr(bench, "FURTHER", {"quick": 40, "full": 2000})
+    monkeypatch.setattr(bench, "REPEATS", {"quick": 2})
+    monkeypatch.setattr(bench, "PATHS", {"quick": (1, 4)})
 
 
 REPORTS = {"json": "json", "junit": "xml", "html": "html", "badge": "svg", "summary": "json"}
@@ -272,16 +277,6 @@ def test_a_right_trajectory_is_proved_and_a_false_step_is_drawn(tmp_path, comman
 
 ROOT = Path(__file__).parent.parent
 FILES = ["bench.html", "bench.json", "bench.svg"]
-
-
-@pytest.fixture(autouse=True)
-def _small(monkeypatch):
-    """Two workloads, and a few questions."""
-    monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1] + workloads.RULES[2:3])
-    monkeypatch.setattr(bench, "QUESTIONS", {"quick": 2, "full": 64})
-    monkeypatch.setattr(bench, "FURTHER", {"quick": 40, "full": 2000})
-    monkeypatch.setattr(bench, "REPEATS", {"quick": 2})
-    monkeypatch.setattr(bench, "PATHS", {"quick": (1, 4)})
 
 
 @pytest.mark.deep

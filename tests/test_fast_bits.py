@@ -3,8 +3,6 @@
 An interrupt ends what kernels do in the middle of one particle's path, and waits for nothing.
 """
 
-from __future__ import annotations
-
 import signal
 import threading
 from queue import SimpleQueue

@@ -1,7 +1,5 @@
 """The disk cache of compiled code: names tell sources apart, and what is damaged is compiled again."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -1,7 +1,5 @@
 """Kernels with one line changed: a comparison of another test module finds each."""
 
-from __future__ import annotations
-
 import pytest
 from support.depth import deep_but
 from support.faulty_kernels import value_of

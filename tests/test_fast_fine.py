@@ -1,7 +1,5 @@
 """The fine step against the reference: about 31 decimals, on generated steps and along paths."""
 
-from __future__ import annotations
-
 import os
 from fractions import Fraction
 from math import hypot

@@ -5,8 +5,6 @@ at which it is asked for: a crossing, a horizon, the order of two hits. Numbers 
 is open at that size; the reference, for which times are exact, has it.
 """
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

@@ -3,8 +3,6 @@
 `MUSHROOMS_LANE_ANSWERS=10000 pytest tests/test_fast_lane_search.py` searches deeper, in each group of draws.
 """
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

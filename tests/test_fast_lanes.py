@@ -3,8 +3,6 @@
 `MUSHROOMS_LANE_STEPS=1000000 pytest tests/test_fast_lanes.py` checks a million steps, in a minute.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """Ensembles that go on: the bits of all cycles at once, wherever they are cut, and who may not go on."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

@@ -6,8 +6,6 @@ along the arc and a chord through the base are one; but a hop keeps what distanc
 given, and a flight that comes from the base does not.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import random

@@ -5,8 +5,6 @@ add up to more than their mean may leave a size that is positive all the same; `
 that it may be negative. A bound below 0 must not be squared, divided by or multiplied by another.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterator

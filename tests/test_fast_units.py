@@ -3,8 +3,6 @@
 `MUSHROOMS_SCALINGS=20000 pytest tests/test_fast_units.py` searches deeper.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from importlib import import_module

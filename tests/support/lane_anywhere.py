@@ -4,8 +4,6 @@ Walls move as far and particles as slowly as lanes allow: near the least radius,
 slit, deep floors, plateaus; starts on every wall.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

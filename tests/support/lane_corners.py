@@ -6,8 +6,6 @@ wall is met and the time are drawn, the velocity follows. The lanes' time of fli
 much: what holds before may not hold after it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from mpmath import fp
 

@@ -6,8 +6,6 @@ wall than the careful step from the same state, or differs from it by more than 
 than the floor, from a start above it by less than the careful step tells, but rising slower.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from functools import partial
 from types import ModuleType

@@ -17,8 +17,6 @@ A flight up a deep stem may be a million times as long as the cap is high: what 
 place of the hit along the path, and no rounding of the start does, which moves it across.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import comb
 

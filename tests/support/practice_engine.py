@@ -5,8 +5,6 @@ is right as it stands, and has a switch for each of its mistakes. The rest of `E
 whoever writes the numbers down.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import pi
 from typing import Any

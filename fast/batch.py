@@ -29,7 +29,7 @@ from fast.ensemble import only_stop
 from fast.kernel.scalar_step import KNOWN
 from fast.kernel.walls import wall_residual
 from fast.kernel.worker import DISK, GENERAL, careful_at, new_worker, run_careful
-from fast.paths import FineTrajectory, as_trajectory, carry, fill_fine_path
+from fast.paths import FineTrajectory, as_trajectory, fill_fine_path
 from fast.pieces import laws_in_lanes
 from fast.step import WALL_NAMES, as_arrays, end_of_path, fitted_start
 from fast.units import compile_scene, fit, outward
@@ -43,7 +43,7 @@ def fill_lane(a, i, particle, age, worker):
     """Put a particle into a lane, its laws known from `age` before its time, if they still serve then."""
     for early in (age, 0.0):
         load(a, i, particle, False)
-        know_laws(a, i, early, worker.scene, worker.pieces, worker.degree, worker.waves)
+        know_laws(a, i, early, worker.laws)
         if a[records.END + i] > particle.t:
             break
     a[records.AS_GIVEN + i], a[records.STOP + i] = 0.0, np.inf
@@ -61,7 +61,7 @@ def step_lanes(pool, a, n, worker, spare):
                 if spare[records.TRIES] > MAX_CORRECTIONS:
                     break
                 t = spare[records.T] + spare[records.S]
-                set_reference(spare, 0, t, spare[records.T_LOW], worker.scene, worker.pieces, worker.degree)
+                set_reference(spare, 0, t, spare[records.T_LOW], worker.laws)
             if spare[records.END] == -np.inf:
                 break
             advance(pool, spare, 1, worker)
@@ -151,18 +151,6 @@ def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple
     return [as_trajectory(scene, *path) for path in paths], seconds
 
 
-def flights(scene: Scene, states: Sequence[State], t_end: float) -> tuple[int, float]:
-    """Follow states to t_end in one thread, as ensembles are: number of collisions, seconds."""
-    run, seconds = carry(scene, states, [None] * len(states), t_end, 1)
-    return int(run.wall_counts.sum()), seconds
-
-
-def as_particle(p: FloatArray, wall: int) -> Particle:
-    """Return a state [t, its low part, x, y, vx, vy], in whatever units, as the kernels take it."""
-    t, t_low, x, y, vx, vy = p.tolist()
-    return Particle(t, t_low, x, y, vx, vy, int(wall))
-
-
 class LaneRound:
     """One pool of lanes, filled with given states; scene and states as they are, in whatever units.
 
@@ -183,13 +171,14 @@ class LaneRound:
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
-        fill_lane(self.pool, np.int64(lane), as_particle(p, wall), float(age), self.worker)
+        particle = Particle._make((*p.tolist(), int(wall)))
+        fill_lane(self.pool, np.int64(lane), particle, float(age), self.worker)
 
     def is_met(self, p: FloatArray, wall: int) -> bool:
         """Tell whether a state lies, but for rounding, on the wall that it leaves, as after a step."""
         if wall in (records.NO_WALL, records.BASE):
             return bool(wall == records.BASE and p[3] == 0.0)
-        f, error = residual(as_particle(p, wall), self.compiled, self.anchors)
+        f, error = residual(Particle._make((*p.tolist(), int(wall))), self.compiled, self.anchors)
         return bool(abs(f) <= error)
 
     def step(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:

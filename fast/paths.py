@@ -92,7 +92,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     halves = np.stack([exponents // 2, exponents - exponents // 2])
     factors = np.ldexp(1.0, np.vstack([halves, -halves]))
     steps, walls = np.empty((n_collisions, 6)), np.empty(n_collisions, np.int64)
-    kernel = PATHS[in_lanes.slope is None, in_lanes.degree]
+    kernel = PATHS[in_lanes.is_slope_moving, in_lanes.degree]
     with np.errstate(over="ignore", under="ignore"):  # without the compiler
         n, code, n_exact = follow_path(
             kernel, (worker, wall, factors, steps, walls), n_collisions, stop.called_off

@@ -23,19 +23,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.kernel.arithmetic import MAX_QUADRANT, split
+from fast.kernel.arithmetic import HALF_PI, MAX_QUADRANT, SAFETY, split
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, PARABOLA, SERIES, TWO_WAVES, fill_pieces
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, BANG_BANG, CONSTANT, DEPTH, FOURIER, KIND, KNOTS, LEVEL, LOWEST, N_HARMONICS, N_KNOTS,
-    OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled, FloatArray, LaneWaves,
-    LawsInLanes, Pieces,
+    AMPLITUDES, BANG_BANG, BEND, CONSTANT, DEPTH, FASTEST, FOURIER, HIGHEST, KIND, KNOTS, LEVEL, LOWEST,
+    N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled,
+    FloatArray, LaneWaves, LawLimits, LawsInLanes, Pieces,
 )  # fmt: skip
-from fast.units import HALF_PI, compile_scene
+from fast.units import compile_scene
 from scene import Scene
 
 SHALLOW = 0.25  # of its mean: see `waves_of`
 MAX_PIECES = 2**15
+LEAST_DEPTH = 2.0**-500  # where a bound says no more than that the depth is positive
 REMAINDER = 2.0**-54
 ALWAYS = np.array([math.inf])
 # No piece serves: known neither when laws repeat nor up to when, so that steps are scalar ones.
@@ -66,8 +67,33 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
     else:
         form = SERIES if (laws[:SHARED, KIND] == FOURIER).any() else PARABOLA
         pieces = pieces_of(compiled, form) or NO_PIECES
-    slope = float(laws[SLOPE, LEVEL]) if laws[SLOPE, KIND] == CONSTANT else None
-    return LawsInLanes(compiled, pieces, form, slope, waves or NO_WAVES)
+    return LawsInLanes(
+        compiled,
+        limits_of(compiled),
+        pieces,
+        waves or NO_WAVES,
+        form,
+        is_slope_moving=bool(laws[SLOPE, KIND] != CONSTANT),
+        slope=float(laws[SLOPE, LEVEL]),
+    )
+
+
+def limits_of(scene: Compiled) -> LawLimits:
+    """Return the limits of a scene's laws."""
+    r, w, h, m = (scene.bounds[row] for row in (RADIUS, WIDTH, DEPTH, SLOPE))
+    grow = 1.0 + SAFETY
+    lean = 1.0 + max(abs(m[LOWEST]), abs(m[HIGHEST]))
+    found = (
+        grow * (r[HIGHEST] * r[BEND] + r[FASTEST] * r[FASTEST]),
+        grow * max(w[BEND] + m[BEND] * h[HIGHEST], h[BEND]),
+        2.0 * m[FASTEST],
+        grow * max(r[FASTEST], w[FASTEST] + m[FASTEST] * h[HIGHEST], h[FASTEST]),
+        grow * r[FASTEST],
+        grow * (r[HIGHEST] + w[HIGHEST] + lean * h[HIGHEST]),
+        grow * lean,
+        grow * h[BEND] * w[HIGHEST] / max(h[LOWEST], LEAST_DEPTH),
+    )
+    return LawLimits(*map(float, found))
 
 
 def waves_of(compiled: Compiled) -> LaneWaves | None:

@@ -25,7 +25,7 @@ import msgspec
 import numpy as np
 
 from fast.kernel import records
-from fast.kernel.arithmetic import half_pi, split
+from fast.kernel.arithmetic import HALF_PI, split
 from fast.kernel.single import LARGEST, LENGTH, TIME, pack_scene, static_time
 
 from fast.kernel.records import (  # isort: skip
@@ -38,7 +38,6 @@ from scene.refusal import BadInput, InvalidScene
 from scene.tables import laws, period, width_factors
 from scene.transforms import scaled_law, times_power
 
-HALF_PI = half_pi()
 TABLES = {"Cap": int(records.CAP), "Stem": int(records.STEM), "Mushroom": int(records.MUSHROOM)}
 
 

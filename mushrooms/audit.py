@@ -57,13 +57,24 @@ def audit_claims(
     particles: int | None,
 ) -> int:
     """Check the paper's claims, or an ensemble of another program; return the exit code."""
-    of_ensemble = {"--scene": scene, "--backwards": backwards, "--energy": energy}
-    of_ensemble |= {"--energy-unit": energy_unit, "--time-unit": time_unit, "--particles": particles}
+    of_ensemble = {
+        "--scene": scene,
+        "--backwards": backwards,
+        "--energy": energy,
+        "--energy-unit": energy_unit,
+        "--time-unit": time_unit,
+        "--particles": particles,
+    }
     if ensemble is None:
         refuse_unheeded(of_ensemble, "there is no --ensemble")
         return _audit_paper(out, full, only, seed, threads, resume, commands, as_json)
-    of_paper = {"--full": full or None, "--only": only, "--threads": threads}
-    of_paper |= {"--resume": resume or None, "--commands": commands or None}
+    of_paper = {
+        "--full": full or None,
+        "--only": only,
+        "--threads": threads,
+        "--resume": resume or None,
+        "--commands": commands or None,
+    }
     refuse_unheeded(of_paper, "an --ensemble is audited")
     options = Options(energy, energy_unit or "v2/2", time_unit, particles)
     return audit_ensemble(ensemble, scene, backwards, options, out, as_json)
@@ -198,10 +209,11 @@ def follow_run(
 ) -> Ensemble:
     """Return what `fast.simulate` would, and follow only what the run's folder lacks."""
     spec = RunSpec(scene, energy, n_cycles, seed, phases)
-    line = spec.command(scene.name, n_particles, place)
     default = block_size(spec, n_particles, threads or os.cpu_count() or 1)
     with writable_folder(place), locked(place), named(place):
-        run = conduct.open_or_create(place, spec, n_particles, None, default, line, resume, at_least=True)
+        run = conduct.open_or_create(
+            place, spec, n_particles, None, default, scene.name, resume, at_least=True
+        )
         engine = partial(conduct.in_process, threads=threads)
         conduct.complete(run, engine, progress, n_particles=n_particles)
         return run.ensemble(n_particles)

@@ -290,9 +290,16 @@ def read_table(path: Path, scene: Mushroom, energy: float | None, unit: float) -
             raise BadInput(f"{label}: captured = {odd[0]}, must be 0 or 1")
         whole["captured"] = whole["captured"].astype(bool)
     assert one is not None
-    whole |= {"n_lost": n_lost, "is_binary32": is_binary32 and len(np.unique(sums[:1000])) > 2}
-    whole |= {"later": sums[:, 1:]} if sums.shape[1] > 1 else {}
-    return GivenEnsemble(scene, one * unit, sums[:, 0], **whole), n_other
+    given = GivenEnsemble(
+        scene,
+        one * unit,
+        sums[:, 0],
+        n_lost=n_lost,
+        is_binary32=is_binary32 and len(np.unique(sums[:1000])) > 2,
+        later=sums[:, 1:] if sums.shape[1] > 1 else None,
+        **whole,
+    )
+    return given, n_other
 
 
 def _is_start(label: str, start: Floats, energy: float, *, is_asked: bool) -> npt.NDArray[np.bool_]:

@@ -36,7 +36,8 @@ from conformance.grading.agreement import Answer, Enclosed, exact
 from conformance.harness.examples import find_examples
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
-from fast.batch import careful_steps, fine_steps, flights, lane_steps
+from fast.batch import careful_steps, fine_steps, lane_steps
+from fast.paths import carry
 from mushrooms.figures import style
 from mushrooms.output import announce_compilation, progress_bar, refuse_unheeded, writable_folder
 from mushrooms.reports import bench_page
@@ -224,8 +225,8 @@ def _lanes(workload: Workload, n_times: int) -> SolverRun:
     t_end = workload.end(workload.length or FLIGHTS)
     seconds, n_collisions = 0.0, 0
     for _ in range(n_times):
-        n, lasted = flights(workload.scene, followed, t_end)
-        n_collisions, seconds = n_collisions + n, seconds + lasted
+        run, lasted = carry(workload.scene, followed, [None] * len(followed), t_end, 1)
+        n_collisions, seconds = n_collisions + int(run.wall_counts.sum()), seconds + lasted
     return SolverRun(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
 
 

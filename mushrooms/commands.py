@@ -200,8 +200,13 @@ def draw(
     """
     from mushrooms.draw import DrawOptions, draw_scene
 
-    asked = {"trajectory": trajectory, "section": section, "map": boundary_map}
-    asked |= {"growth": growth, "lyapunov": lyapunov}
+    asked = {
+        "trajectory": trajectory,
+        "section": section,
+        "map": boundary_map,
+        "growth": growth,
+        "lyapunov": lyapunov,
+    }
     options = DrawOptions(energy, collisions, cycles, particles, seed, phase)
     draw_scene(scene, out, [kind for kind in asked if asked[kind]], export, options)
 

@@ -7,8 +7,8 @@ pictures of all pages, and the tests run the same blocks.
 
 from __future__ import annotations
 
-import io
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -47,9 +47,7 @@ def draw(page: Path, folder: Path) -> list[Path]:
         exec(compile(code, f"{page.name}: {name}", "exec"), names)
         picture = names.pop("figure")
         if isinstance(picture, Figure):
-            file = io.BytesIO()
-            style.save(picture, file, Path(name).suffix)
-            picture = file.getvalue()
+            picture = partial(style.save, picture, suffix=Path(name).suffix)
         write_file(folder / name, picture)
         written.append(folder / name)
     return written

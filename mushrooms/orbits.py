@@ -197,10 +197,13 @@ class FollowedOrbit:
         (see `Section`).
         """
         n = len(self.walls) + 1
-        found: dict[str, list[Any]] = {"collision": list(range(n)), "wall": [self.start.wall, *self.walls]}
-        found["dt"] = [None, *self.steps[:, 0].tolist()]
-        found |= dict(zip(("t", "x", "y", "vx", "vy"), self.states().T.tolist(), strict=True))
-        found["energy"] = self.energies().tolist()
+        found: dict[str, list[Any]] = {
+            "collision": list(range(n)),
+            "wall": [self.start.wall, *self.walls],
+            "dt": [None, *self.steps[:, 0].tolist()],
+            **dict(zip(("t", "x", "y", "vx", "vy"), self.states().T.tolist(), strict=True)),
+            "energy": self.energies().tolist(),
+        }
         at_arc = np.full((n, 4), None)
         if not isinstance(self.scene, Stem):
             section = self.section()

@@ -144,9 +144,14 @@ def count_hits(scene: Scene, state: State, t_end: float) -> dict[str, int] | Non
 
 
 def _row(tally: Any) -> dict[str, Any]:
-    row = {"family": tally.family, "cases": tally.n_cases, **tally.counts}
-    row |= {"worst_ulps": tally.worst_ulps, "slowest_s": tally.slowest}
-    return row | {f"{kind}_cases": cases for kind, cases in tally.cases.items()}
+    return {
+        "family": tally.family,
+        "cases": tally.n_cases,
+        **tally.counts,
+        "worst_ulps": tally.worst_ulps,
+        "slowest_s": tally.slowest,
+        **{f"{kind}_cases": cases for kind, cases in tally.cases.items()},
+    }
 
 
 def _print(tallies: list[Any]) -> None:

@@ -66,6 +66,13 @@ def blocks(document: str, language: str) -> list[tuple[str, str]]:
     return [(name, text) for kind, _, name, text in found if kind == language]
 
 
+def write_tutorial(folder: Path) -> None:
+    """Write the files of the tutorial into a folder."""
+    for name, text in blocks("your-stepper.md", "python"):
+        if name:
+            (folder / name).write_text(text)
+
+
 def matches(shown: str, output: str) -> bool:
     """Tell whether the output has the shown lines in this order; `...` stands for anything."""
     pattern = re.escape(shown.strip()).replace(r"\.\.\.", ".*?")
@@ -75,9 +82,7 @@ def matches(shown: str, output: str) -> bool:
 @pytest.mark.deep
 def test_the_tutorial_does_what_it_says(tmp_path):
     """One block after the other, in the reader's folder."""
-    for name, text in blocks("your-stepper.md", "python"):
-        if name:
-            (tmp_path / name).write_text(text)
+    write_tutorial(tmp_path)
     (tmp_path / "known.txt").write_text("static-stem/1\n")
     programs = Path(sys.executable).parent
     environment = {**os.environ, "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}", "COLUMNS": "140"}
@@ -125,9 +130,7 @@ def test_the_tutorial_holds_a_python_stepper_to_a_property():
 
 
 def test_the_tutorials_stepper_guesses_no_hit_at_the_horizon(tmp_path, monkeypatch):
-    for name, text in blocks("your-stepper.md", "python"):
-        if name:
-            (tmp_path / name).write_text(text)
+    write_tutorial(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     question = {"scene": {"w": 1.0, "h": 1.0}, "state": {"t": 0.0, "x": 0.0, "y": -0.5, "vx": 1.0, "vy": 0.0}}
     outcomes = [importlib.import_module("box").step({**question, "t_end": t})["outcome"] for t in (0.5, 1, 2)]

@@ -28,8 +28,18 @@ from fast.kernel import worker
 from fast.kernel.compiling import HOW, TOOLS
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES, fresh_phase, law_at, law_of_waves, piece_at
 from fast.kernel.lanes import chord, fly
-from fast.kernel.records import DEPTH, LANES, MUSHROOM, N_HARMONICS, OMEGA, POOL_SIZE, SHARED, Compiled
-from fast.kernel.worker import CACHE_LINE, LawLimits, new_pools
+from fast.kernel.records import (
+    DEPTH,
+    LANES,
+    MUSHROOM,
+    N_HARMONICS,
+    OMEGA,
+    POOL_SIZE,
+    SHARED,
+    Compiled,
+    LawLimits,
+)
+from fast.kernel.worker import CACHE_LINE, new_pools
 from fast.pieces import PARABOLA, SERIES, laws_in_lanes, waves_of
 from fast.step import WALL_CODES
 from fast.units import compile_scene, fit

@@ -8,7 +8,6 @@ import re
 import shutil
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -48,19 +47,14 @@ def _few(monkeypatch):
     monkeypatch.setattr(output, "FIRST", math.inf)
 
 
-@pytest.fixture
-def call(command_line):
-    return partial(command_line, "check")
-
-
 REPORTS = {"json": "json", "junit": "xml", "html": "html", "badge": "svg", "summary": "json"}
 
 
 @pytest.mark.deep
-def test_a_good_stepper_is_accepted_and_reported(call, tmp_path):
+def test_a_good_stepper_is_accepted_and_reported(command_line, tmp_path):
     files = {kind: tmp_path / f"{kind}.{ending}" for kind, ending in REPORTS.items()}
     options = [part for kind, path in files.items() for part in (f"--{kind}", path)]
-    code, out, err = call("--seed", "77", *options, "--", *PYTHON)
+    code, out, err = command_line("check", "--seed", "77", *options, "--", *PYTHON)
     assert (code, err) == (0, "")
     assert "ns per collision" in out
     assert sorted(tmp_path.iterdir()) == sorted(files.values())
@@ -81,10 +75,12 @@ def test_a_good_stepper_is_accepted_and_reported(call, tmp_path):
     assert len(assert_stands_alone(page)) == page.count("<figure") >= 3
 
 
-def test_a_bad_stepper_is_not(call, tmp_path):
+def test_a_bad_stepper_is_not(command_line, tmp_path):
     """One that keeps the protocol and knows no physics: it fails by verdict, never by crash."""
     page = tmp_path / "r.html"
-    code, out, _ = call("--seed", 5, "--html", page, "--json", tmp_path / "r.json", "--", *command("honest"))
+    code, out, _ = command_line(
+        "check", "--seed", 5, "--html", page, "--json", tmp_path / "r.json", "--", *command("honest")
+    )
     assert code == 1
     assert re.search(r"property/\S+ as a test, where implementation is \[.*@example\(", out, re.DOTALL)
     assert re.search(r"; mushrooms ask \S+ --seed 5 prints it\n", out)
@@ -98,7 +94,7 @@ def test_a_bad_stepper_is_not(call, tmp_path):
 
 
 @pytest.mark.deep
-def test_a_faulty_stepper_is_told_its_fault(call, tmp_path):
+def test_a_faulty_stepper_is_told_its_fault(command_line, tmp_path):
     """What was given beside what is certified, and the mutant whose failures are the same."""
     served = tmp_path / "faulty.py"
     served.write_text(
@@ -106,7 +102,9 @@ def test_a_faulty_stepper_is_told_its_fault(call, tmp_path):
         "m = COMMON['wall-velocity-once']\n"
         "serve('faulty', m.step, m.trajectory, sys.stdin.buffer, sys.stdout.buffer)\n"
     )
-    code, out, _ = call("--seed", 1, "--html", tmp_path / "r.html", "--", sys.executable, served)
+    code, out, _ = command_line(
+        "check", "--seed", 1, "--html", tmp_path / "r.html", "--", sys.executable, served
+    )
     assert code == 1
     assert "like wall-velocity-once on " in out
     assert "  certified collision wall=" in out
@@ -117,17 +115,17 @@ def test_a_faulty_stepper_is_told_its_fault(call, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["exit-silently", "other-protocol", "fourteen-digits"])
-def test_reports_of_broken_sessions_are_written_too(call, tmp_path, name):
+def test_reports_of_broken_sessions_are_written_too(command_line, tmp_path, name):
     options = [part for kind in REPORTS for part in (f"--{kind}", tmp_path / f"{kind}.{REPORTS[kind]}")]
-    code, out, _ = call("--restarts", 1, *options, "--", *command(name))
+    code, out, _ = command_line("check", "--restarts", 1, *options, "--", *command(name))
     assert (code, "not accepted" in out) == (1, True)
     assert len(list(tmp_path.iterdir())) == len(REPORTS)
 
 
-def test_a_piped_run_tells_on_stderr_how_far_it_is(call, monkeypatch):
+def test_a_piped_run_tells_on_stderr_how_far_it_is(command_line, monkeypatch):
     monkeypatch.setattr(output, "FIRST", 0.0)
     monkeypatch.setattr(output, "EVERY", 0.0)
-    _, _, err = call("--groups", "static-stem", "--", *command("honest"))
+    _, _, err = command_line("check", "--groups", "static-stem", "--", *command("honest"))
     lines = err.splitlines()
     assert len(lines) > 5
     assert all(re.fullmatch(r"check: \d+ of \d+ cases, .*(left|unknown)", line) for line in lines)
@@ -151,11 +149,11 @@ LAST_WORDS = "\n  ModuleNotFoundError: No module named 'no_such_module'\n"
         (EVIL, ["<script>"]),
     ],
 )
-def test_what_a_broken_stepper_says_is_told_as_text(call, tmp_path, code, words):
+def test_what_a_broken_stepper_says_is_told_as_text(command_line, tmp_path, code, words):
     """In few lines, and in the page escaped."""
     script = tmp_path / "broken.py"
     script.write_text(code)
-    ended = call("--html", tmp_path / "r.html", "--", sys.executable, script)
+    ended = command_line("check", "--html", tmp_path / "r.html", "--", sys.executable, script)
     assert ended.code == 1
     assert all(word in ended.out for word in words)
     assert ended.out.count("not asked: start failed") <= 1
@@ -207,27 +205,23 @@ def test_the_pytest_case_fails_and_skips_with_the_verdict():
 PLAIN = [sys.executable, "-m", "conformance.plain"]
 
 
-@pytest.fixture
-def ask(command_line):
-    return partial(command_line, "ask")
-
-
-def test_it_prints_question_answer_and_rule_or_the_vector_as_json(ask):
+def test_it_prints_question_answer_and_rule_or_the_vector_as_json(command_line):
     vector = next(v for v in vectors.load() if v.id == "moving-cap/3")
-    code, out, err = ask("moving-cap/3")
+    code, out, err = command_line("ask", "moving-cap/3")
     assert (code, err) == (0, "")
     question = next(line for line in out.splitlines() if line.startswith("question"))
     assert json.loads(question.removeprefix("question")) == vectors.request(vector, 0)
     assert vector.rule in out
     assert f"wall={vector.expect[0].steps[0].wall!r}" in out
     assert out.endswith("verifier   proved\n")
-    assert msgspec.convert(ask("moving-cap/3", "--json").data(), type=vectors.Vector).id == "moving-cap/3"
+    again = command_line("ask", "moving-cap/3", "--json").data()
+    assert msgspec.convert(again, type=vectors.Vector) == vector
 
 
-def test_the_verifiers_word_is_about_the_vector(ask, monkeypatch):
+def test_the_verifiers_word_is_about_the_vector(command_line, monkeypatch):
     later = msgspec.structs.replace(vectors.load()[0], t_end=vectors.load()[0].state.t)
     monkeypatch.setattr(vectors, "load", lambda level: (later,))
-    _, out, _ = ask(later.id)
+    _, out, _ = command_line("ask", later.id)
     assert "verifier   false the answer is horizon" in out
 
 
@@ -240,8 +234,8 @@ def test_the_verifiers_word_is_about_the_vector(ask, monkeypatch):
         (["moving-cap/3"], command("honest"), "fail: "),
     ],
 )
-def test_it_grades_a_stepper(ask, arguments, stepper, word):
-    code, out, _ = ask(*arguments, "--", *stepper)
+def test_it_grades_a_stepper(command_line, arguments, stepper, word):
+    code, out, _ = command_line("ask", *arguments, "--", *stepper)
     assert code == (word == "fail: ")
     assert word in out
     assert ("asked " in out) == ("--seed" in arguments and arguments[0] != "fresh/3")
@@ -296,15 +290,10 @@ def _small(monkeypatch):
     monkeypatch.setattr(bench, "PATHS", {"quick": (1, 4)})
 
 
-@pytest.fixture
-def call_bench(command_line):
-    return partial(command_line, "bench")
-
-
 @pytest.mark.deep
-def test_a_benchmark_is_written_whole_and_again(call_bench, tmp_path, monkeypatch):
+def test_a_benchmark_is_written_whole_and_again(command_line, tmp_path, monkeypatch):
     one = [sys.executable, "-m", "fast"]
-    code, out, err = call_bench("--quick", "--out", tmp_path / "one", "--seed", 5, "--", *one)
+    code, out, err = command_line("bench", "--quick", "--out", tmp_path / "one", "--seed", 5, "--", *one)
     assert (code, re.sub("compiling the fast stepper .*\n", "", err)) == (0, "")
     assert sorted(p.name for p in (tmp_path / "one").iterdir()) == FILES
     found = record.read(tmp_path / "one" / "bench.json")
@@ -328,19 +317,19 @@ def test_a_benchmark_is_written_whole_and_again(call_bench, tmp_path, monkeypatc
     # The same seed asks the same questions, so that the errors are the same to the last bit.
     monkeypatch.setattr(bench_page, "growth", lambda *_: b"<svg/>")  # drawn above
     monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1])
-    assert call_bench("--quick", "--out", tmp_path / "two", "--seed", 5)[0] == 0
+    assert command_line("bench", "--quick", "--out", tmp_path / "two", "--seed", 5)[0] == 0
     again = record.read(tmp_path / "two" / "bench.json")
     errors = [{(p.workload, p.solver): p.relative for p in r.points} for r in (found, again)]
     assert all(errors[0][key] == errors[1][key] for key in errors[1])
 
 
-def test_the_page_on_speed_shows_what_the_record_holds(call_bench):
+def test_the_page_on_speed_shows_what_the_record_holds(command_line):
     path, text = ROOT / "docs/bench/bench.json", (ROOT / "docs/speed.md").read_text("utf-8")
     assert record.read(path).size == "full"
     steppers, lanes = (
         [
             [cell.strip() for cell in line.split("|")]
-            for line in call_bench("--table", path, *more).out.splitlines()
+            for line in command_line("bench", "--table", path, *more).out.splitlines()
         ]
         for more in ((), ("--workload", "all"))
     )

@@ -466,9 +466,9 @@ def test_exports_have_every_bit(command_line, stored, tmp_path):
         "particle": np.arange(N),
         "cycle_energies_1": ensemble.energy,
         "t_in_1_1": ensemble.t_in[:, 0, 0],
+        "phase_captured_1_2": ensemble.phase_captured[:, 0, 1],
+        "wall_counts_floor": ensemble.wall_counts[:, 4],
     }
-    wanted |= {"phase_captured_1_2": ensemble.phase_captured[:, 0, 1]}
-    wanted |= {"wall_counts_floor": ensemble.wall_counts[:, 4]}
     for name, column in wanted.items():
         for found in (rows, table):
             np.testing.assert_array_equal(np.asarray(found[name]), column)

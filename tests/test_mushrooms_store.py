@@ -29,10 +29,11 @@ from mushrooms.store import conduct
 from mushrooms.store import run as stored
 from mushrooms.store.run import DESCRIPTION, DIGESTED, StoredRun
 from mushrooms.store.spec import LANES, SCHEMA, RunSpec, paused_of, shape_of
-from scene import load
+from scene import load, to_data
 
 pytestmark = pytest.mark.usefixtures("unsynced")
 N, ENERGY, SEED = 330, 40.0, 7
+STEM = to_data(load("fermi-ulam"))
 
 
 def arguments(folder, *more, n=N, block=64, name="fermi-ulam"):
@@ -43,12 +44,11 @@ def arguments(folder, *more, n=N, block=64, name="fermi-ulam"):
 @pytest.fixture(scope="module")
 def whole():
     """Return the SHA-256 of a run at once."""
-    return run_at_once("fermi-ulam", N)
+    return at_once(N).sha256()
 
 
-def run_at_once(name, n, energy=ENERGY, n_cycles=1):
-    run = fast.simulate(load(name), n_particles=n, energy=energy, n_cycles=n_cycles, seed=SEED)
-    return run.sha256()
+def at_once(n, n_cycles=1, name="fermi-ulam"):
+    return fast.simulate(load(name), n_particles=n, energy=ENERGY, n_cycles=n_cycles, seed=SEED)
 
 
 def digest_of(ended):
@@ -126,7 +126,7 @@ def test_a_run_goes_on_with_what_it_lacks(command_line, tmp_path, followed, brea
         ended = command_line(*arguments(tmp_path, "--cycles", cycles, "--resume", n=n, block=32))
         if n_kept is None:
             assert followed == wanted
-            assert digest_of(ended) == run_at_once("fermi-ulam", n, n_cycles=cycles)
+            assert digest_of(ended) == at_once(n, cycles).sha256()
         else:
             assert (ended.code, ended.out, wanted in ended.err) == (130, "", True)
             group = zarr.open_group(tmp_path / "ensemble.zarr", mode="r")  # what is missing is nan, or -1
@@ -243,6 +243,8 @@ def test_one_writer_holds_a_folder(command_line, tmp_path, whole):
         ({"schema": 0}, ["--resume"], [f"schema = 0 there, {SCHEMA} asked for"]),
         ({"version": "0.0.9"}, ["--resume"], ["version = '0.0.9' there", repr(mushrooms.__version__)]),
         ({"scene": {"table": "stem"}}, ["--resume"], ["scene: ", "= None there"]),
+        ({"scene": STEM | {"w": {"mean": 1.0}}}, ["--resume"], ["scene: w = {'mean': 1.0} there, 1.0 asked"]),
+        ({"scene": STEM | {"h": {**STEM["h"], "mean": 9.0}}}, ["--resume"], ["scene: h: mean = 9.0 there"]),
     ],
 )
 def test_another_run_in_the_folder_is_refused(command_line, finished, change, options, words):
@@ -306,7 +308,7 @@ def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, 
             if folder.exists():
                 harmed(folder, random)
         break_off(10**4)
-        assert digest_of(command_line(*run)) == run_at_once("fermi-ulam", n, n_cycles=cycles)
+        assert digest_of(command_line(*run)) == at_once(n, cycles).sha256()
 
 
 def faulty_sums(_array):
@@ -353,10 +355,6 @@ def lengthened(folder, cycles, n=N_LONG, block=BLOCK, name="fermi-ulam"):
     return arguments(folder, "--cycles", cycles, "--resume", n=n, block=block, name=name)
 
 
-def cycles_at_once(n_cycles, n=N_LONG, name="fermi-ulam"):
-    return fast.simulate(load(name), n_particles=n, energy=ENERGY, n_cycles=n_cycles, seed=SEED)
-
-
 def summary_of(ended):
     return {name: value for name, value in ended.data().items() if name != "ns_per_collision"}
 
@@ -373,7 +371,7 @@ def test_a_run_is_lengthened_and_widened_to_the_bits_of_one_at_once(command_line
     """In several goes, with blocks of any size: arrays, digest, and whole sums."""
     for n, cycles in ((30, 1), (50, 3), (60, 4)):
         found = summary_of(command_line(*lengthened(tmp_path / "a", cycles, n=n, block=13, name=name)))
-    wanted = cycles_at_once(cycles, n, name)
+    wanted = at_once(n, cycles, name)
     assert found["sha256"] == wanted.sha256()
     other = lengthened(tmp_path / "b", cycles, n=n, block=25, name=name)
     assert summary_of(command_line(*other)) == found
@@ -412,7 +410,7 @@ def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
         patch.setattr(stored, "write_file", unmarked)
         assert command_line(*lengthened(tmp_path, 3)).code == 2
     ended = command_line(*lengthened(tmp_path, 3))
-    assert digest_of(ended) == cycles_at_once(3).sha256()
+    assert digest_of(ended) == at_once(N_LONG, 3).sha256()
     # Its first chunks hold the cycles there were, with the same bits, or later ones alone.
     assert ("1 blocks (0)" in ended.err) == (n_written > 3)
 

@@ -20,7 +20,7 @@ from scene.transforms import backwards
 from theory import NotCovered, cumulants
 from theory.finite_energy import rates
 from theory.finite_energy.fits import extrapolate, fit_power, unbiased_mean
-from theory.finite_energy.one_cycle import FiniteEnergy, PointMasses, _joined, at_energy, kernel_cdf
+from theory.finite_energy.one_cycle import FiniteEnergy, at_energy, kernel_cdf
 from theory.finite_energy.rates import (
     MEMORIES,
     N_TIMES,
@@ -150,19 +150,6 @@ def test_the_zone_ends_at_the_peak_and_begins_at_nothing() -> None:
     assert variance[0] == pytest.approx(0, abs=1e-9)
     assert (mean[-1], variance[-1]) == pytest.approx(found.peak, abs=2e-5)
     assert 0 < variance[1] < variance[2]
-
-
-def test_joining_keeps_mass_and_mean() -> None:
-    rng = np.random.default_rng(3)
-    n = 60_000
-    t_in = np.where(rng.random(n) < 0.1, np.nan, rng.random(n))
-    a = PointMasses(rng.random(n), rng.standard_normal(n), rng.random(n), rng.random(n), t_in)
-    b = _joined([a])
-    assert len(b.gain) <= 40_000 < n
-    assert b.weight.sum() == pytest.approx(a.weight.sum())
-    for x, y in ((a.gain, b.gain), (a.shift, b.shift), (a.variance, b.variance)):
-        assert a.weight @ x == pytest.approx(b.weight @ y)
-    assert b.weight[b.is_free].sum() == pytest.approx(a.weight[a.is_free].sum())
 
 
 ALLOWED = [

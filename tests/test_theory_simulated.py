@@ -137,10 +137,11 @@ def main() -> int:
                 size = figure.predicted if figure.name.endswith("variance") else 1.0
                 off = value / size if size != 1 else value - figure.predicted
                 print(
-                    f"{figure.name:<40} {figure.predicted:>10.5g} {off:>+9.4f} +- {error / size:.4f}", end=" "
+                    f"{figure.name:<40} {figure.predicted:>10.5g} {off:>+9.4f} +- {error / size:.4f}"
+                    f" allowed {figure.allowed / size:.4f} excess {figure.excess:.2f}"
+                    f" slack {figure.slack:.2f}",
+                    flush=True,
                 )
-                print(f"allowed {figure.allowed / size:.4f} excess {figure.excess:.2f}", end=" ")
-                print(f"slack {figure.slack:.2f}", flush=True)
             every += found
     far = sum(figure.excess > NEAR for figure in every)
     print(f"{far} of {len(every)} figures are off by over {NEAR:g} standard errors more than allowed")

@@ -322,7 +322,8 @@ class Descent:
     """
 
     def __init__(self, binary: Binary, piece: CapturePiece) -> None:
-        self.binary, self.piece, self.number, self.halvings = binary, piece.changed(binary.taken), 0, 0
+        self.binary, self.number, self.halvings = binary, 0, 0
+        self.piece = CapturePiece(*(stretch.changed(binary.taken) for stretch in piece))
         (self._top, p), (bottom, q) = self.piece.top, self.piece.bottom
         self._drop, self._orders, m = self._top - bottom, (p, q), p + q - 1
         self._powers = [(j, m - j, comb(m, j)) for j in range(p, m + 1)]

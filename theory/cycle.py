@@ -200,10 +200,6 @@ class CapturePiece(NamedTuple):
     capture: MonotoneStretch
     release: MonotoneStretch
 
-    def changed(self, change: Callable[[Any], Any]) -> CapturePiece:
-        """Return the piece with its numbers in another form."""
-        return CapturePiece(self.capture.changed(change), self.release.changed(change))
-
     @property
     def nu_upper(self) -> Any:
         """Largest nu of the piece."""
@@ -426,8 +422,9 @@ def _mouth(system: Any, pieces: tuple[Piece, Piece]) -> Motion:
 
     def mouth(t: Any) -> tuple[Any, Any]:
         turn = turning(t)
-        w, r = width.value(t, turn), radius.value(t, turn)
-        return w / r, (width.rate(t, turn) * r - w * radius.rate(t, turn)) / (r * r)
+        r = radius.value(t, turn)
+        nu = width.value(t, turn) / r
+        return nu, (width.rate(t, turn) - nu * radius.rate(t, turn)) / r  # of a small r, r^2 would be 0
 
     return mouth
 

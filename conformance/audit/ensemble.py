@@ -40,6 +40,7 @@ from conformance.audit.tolerances import (
     share,
     spread,
     stated,
+    steepest,
 )
 from scene import Mushroom
 from scene.geometry import half_width, table_at
@@ -250,7 +251,7 @@ def _captures(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
         yield close("width of their peak", spread(free), sigma, band=sigma * left.variance / 2)
         yield fits(FREE, _some(free), theirs.free_cdf, band=band, scale=0.4)
     if len(caught) >= FEW and theirs.p_nc < 1:
-        band += left.captured_mean * _steepest(caught, theirs.captured_cdf)
+        band += left.captured_mean * steepest(theirs.captured_cdf, *np.quantile(caught, (0.001, 0.999)))
         yield fits(CAPTURED, _some(caught), theirs.captured_cdf, band=band, scale=0.4)
 
 
@@ -299,12 +300,6 @@ def _later(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
 
 def _some(values: FloatArray, most: int = MOST_SORTED) -> FloatArray:
     return values[:: 1 + (len(values) - 1) // most]
-
-
-def _steepest(values: FloatArray, cdf: Cdf) -> float:
-    lowest, highest = np.quantile(values, (0.001, 0.999)).tolist()
-    places = np.linspace(lowest, highest, 400)
-    return float(np.max(np.diff(cdf(places)) / np.diff(places)))
 
 
 class Rival(NamedTuple):

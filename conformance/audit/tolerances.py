@@ -186,6 +186,12 @@ def seen_late(cdf: Cdf, times: FloatArray, wait: float) -> float:
     return float(np.max(cdf(grid) - cdf(grid - wait)))
 
 
+def steepest(cdf: Cdf, lowest: float, highest: float) -> float:
+    """Return the largest density of a distribution between two places."""
+    places = np.linspace(lowest, highest, 400)
+    return float(np.max(np.diff(cdf(places)) / np.diff(places)))
+
+
 def chance(values: FloatArray, cdf: Cdf) -> float:
     """Return Kolmogorov's p: how likely so large a distance is if the law is right."""
     return float(ks_1samp(values, cdf, method="exact").pvalue)

@@ -34,6 +34,25 @@ ONE_6TH_LOW, ONE_24TH_LOW, ONE_120TH_LOW = (float(Fraction(1, n) - Fraction(1.0 
 TWO_OVER_PI = 0.6366197723675814
 
 
+def split(number: Fraction, n: int = 2) -> list[float]:
+    """Split a number into n floats, each the nearest to what is left."""
+    found = []
+    for _ in range(n):
+        found.append(float(number))
+        number -= Fraction(found[-1])
+    return found
+
+
+def _half_pi() -> Fraction:
+    """Return pi / 2 to 300 bits."""
+    ctx = MPContext()
+    ctx.prec = 300
+    return Fraction(*map(int, (ctx.pi / 2).as_integer_ratio()))
+
+
+HALF_PI = _half_pi()
+
+
 @intrinsic
 def _compiled_fma(_context: Any, a: Any, b: Any, c: Any) -> Any:
     def generate(_: Any, builder: ir.IRBuilder, __: Any, arguments: Any) -> Any:
@@ -193,7 +212,7 @@ def sine_cosine(omega, omega_low, k, t_hi, t_lo):
 N_TERMS = 15  # of a series for an angle up to pi/4: to 2^-106
 
 
-QUARTER_TURN, QUARTER_TURN_LOW = math.pi / 2, 6.123233995736766e-17  # pi/2 as two floats
+QUARTER_TURN, QUARTER_TURN_LOW = split(HALF_PI)
 
 
 @kept(error_model="numpy")
@@ -206,23 +225,7 @@ def directions(turns):
     return out
 
 
-def split(number: Fraction, n: int = 2) -> list[float]:
-    """Split a number into n floats, each the nearest to what is left."""
-    found = []
-    for _ in range(n):
-        found.append(float(number))
-        number -= Fraction(found[-1])
-    return found
-
-
-def half_pi() -> Fraction:
-    """Return pi / 2 to 300 bits."""
-    ctx = MPContext()
-    ctx.prec = 300
-    return Fraction(*map(int, (ctx.pi / 2).as_integer_ratio()))
-
-
-HALF_PI = np.array(split(half_pi(), 4))
+HALF_PI_PARTS = np.array(split(HALF_PI, 4))
 # 1 / n! with the series' signs: of sin in odd rows, of cos in even ones.
 TERMS = np.array([split(Fraction((-1) ** (n // 2), math.factorial(n))) for n in range(2 * N_TERMS)])
 
@@ -274,7 +277,7 @@ def fine_sine_cosine(angle):
     n = np.floor(angle[0] * TWO_OVER_PI + 0.5)
     r = angle
     for k in range(4):
-        r = add(r, two_product(-n, HALF_PI[k]))
+        r = add(r, two_product(-n, HALF_PI_PARTS[k]))
     z = mul(r, r)
     sine, cosine = series(r, z, 1), series(r, z, 0)
     s, c = turned(n, sine[0], cosine[0])

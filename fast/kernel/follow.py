@@ -58,7 +58,7 @@ def keep_lane(pool, a, i, roster, is_known, worker):
     out[:] = 0.0
     out[POOL], out[NEXT], out[CAREFUL] = pool, roster[NEXT_STOP, i], followed.careful[j]
     out[IS_KNOWN] = 1.0 if is_known else 0.0
-    last = REF if not is_known else (R1 + STRIDE if worker.degree % 2 == 1 else W0_LOW)
+    last = REF if not is_known else (R1 + STRIDE if worker.laws.degree % 2 == 1 else W0_LOW)
     for k in range(last // STRIDE):
         out[FIRST_ROW + k] = a[k * STRIDE + i]
 
@@ -77,8 +77,8 @@ def take_lane(a, i, roster, j, worker):
     if a[STAY_IN + i] == NEVER:
         a[STAY + i] = NOT_YET
     a[STOP + i], a[END + i] = -NEVER, -NEVER
-    if kept[IS_KNOWN] > 0.0 and worker.degree % 2 == 0:
-        set_piece(a, i, int(a[PIECE + i]), worker.scene, worker.pieces, worker.degree)
+    if kept[IS_KNOWN] > 0.0 and worker.laws.degree % 2 == 0:
+        set_piece(a, i, int(a[PIECE + i]), worker.laws)
     elif kept[IS_KNOWN] > 0.0:
         a[END + i] = NEVER
 
@@ -167,13 +167,14 @@ def finish(pool, a, i, j, code, end, followed):
 def advance(pool, a, n, worker):
     """Take a step of the first n lanes of a pool, whole registers of them, where it is shown right."""
     loop = worker.loops.chord if pool == DISK else worker.loops.fly
-    run_step(loop, (a, n, worker.scene, worker.waves, worker.slope, worker.limits))
+    laws = worker.laws
+    run_step(loop, (a, n, laws.scene, laws.waves, laws.slope, laws.limits))
 
 
 @part
 def set_stop(a, i, since, roster, worker):
     """Tell a lane when `attend` is to look at it next: never later than a period after the time `since`."""
-    times, at, pieces = worker.stops.times, roster[NEXT_STOP, i], worker.pieces
+    times, at, pieces = worker.stops.times, roster[NEXT_STOP, i], worker.laws.pieces
     stop = min(since + pieces.period, pieces.until)
     a[STOP + i] = min(stop, times[at]) if at < times.shape[0] else stop
 
@@ -183,16 +184,16 @@ def careful_flight(a, i, worker):
     """Find a lane's next collision carefully; returns what `careful_step` does."""
     p = particle_of(a, i)
     limit = (worker.stops.times[-1] - p.t) - p.t_low
-    return run_careful(worker.loops.careful, (p, limit, KNOWN, worker.scene, worker.anchors))
+    return run_careful(worker.loops.careful, (p, limit, KNOWN, worker.laws.scene, worker.anchors))
 
 
 @kernel
 def land_carefully(pool, a, i, code, s, p, worker):
     """Move a lane to the collision that a scalar step has found; the anchors hold the laws there."""
-    scene, hit = worker.scene, float(code)
+    scene, hit = worker.laws.scene, float(code)
     if code != ARC or a[WALL + i] != ON_ARC:  # it has left the arc by now
         a[AS_GIVEN + i] = 0.0
-    if worker.scene.table == MUSHROOM:
+    if worker.laws.scene.table == MUSHROOM:
         w, vx, vy = worker.anchors[WIDTH, VALUE], a[VX + i], a[VY + i]
         if scene.is_relative:
             w *= worker.anchors[RADIUS, VALUE]
@@ -203,7 +204,7 @@ def land_carefully(pool, a, i, code, s, p, worker):
     put_particle(a, i, p)
     a[WALL + i], a[S + i], a[TRIES + i] = hit, s, 0.0
     if worker.is_laned:
-        know_laws(a, i, 0.0, scene, worker.pieces, worker.degree, worker.waves)
+        know_laws(a, i, 0.0, worker.laws)
 
 
 @kernel
@@ -253,7 +254,7 @@ def mark(pool, a, i, since, roster, worker):
     is_clearly_captured = a[STAY + i] == CLEARLY
     note_stay(a, i, roster, worker.stops, worker.followed)
     if a[T + i] >= a[END + i] and a[END + i] > -NEVER:
-        set_reference(a, i, a[T + i], a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
+        set_reference(a, i, a[T + i], a[T_LOW + i], worker.laws)
     if knows_laws(a, i, worker):
         set_stop(a, i, since, roster, worker)
     else:
@@ -278,7 +279,7 @@ def code_of_attention(pool, a, i, roster, worker):
         note_stops(a, i, roster, a[WHEN + i], stops, followed)
         if roster[NEXT_STOP, i] == stops.times.shape[0]:
             code = HORIZON
-        if not a[WHEN + i] < worker.pieces.until:
+        if not a[WHEN + i] < worker.laws.pieces.until:
             a[END + i] = -NEVER
     else:
         code = step_carefully(pool, a, i, roster, worker)
@@ -305,10 +306,10 @@ def attend(pool, a, i, roster, worker):
         return mark(pool, a, i, a[T + i], roster, worker)
     if knows and fate == FAR and a[TRIES + i] <= MAX_CORRECTIONS:  # the piece at the flight's end
         t = a[T + i] + a[S + i]
-        set_reference(a, i, t, a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
+        set_reference(a, i, t, a[T_LOW + i], worker.laws)
         if a[END + i] > -NEVER:
             return STAYS
-    if pool == DISK and worker.scene.table == MUSHROOM and not (knows and fate == LATE):
+    if pool == DISK and worker.laws.scene.table == MUSHROOM and not (knows and fate == LATE):
         refold(a, i)
         a[WALL + i], a[TRIES + i] = ON_ARC, 0.0
         return MOVES
@@ -333,7 +334,7 @@ def last_to_attend(a, n):
 @part
 def change_place(worker, pool, i, other, j):
     """Copy a lane and its entry in the roster to another place; without coefficients where laws are waves."""
-    last = POOL_SIZE if worker.degree % 2 == 0 else LAWS
+    last = POOL_SIZE if worker.laws.degree % 2 == 0 else LAWS
     copy_rows(worker.pools[pool], i, worker.pools[other], j, T, last)
     worker.rosters[other, PARTICLE, j] = worker.rosters[pool, PARTICLE, i]
     worker.rosters[other, NEXT_STOP, j] = worker.rosters[pool, NEXT_STOP, i]
@@ -359,7 +360,8 @@ def scan(pool, worker):
 @part
 def take_in(worker, j, wall):
     """Put a particle into the next lane: from its start, or as it was kept."""
-    n_held, home, followed = worker.n_held, DISK if worker.scene.table == CAP else GENERAL, worker.followed
+    n_held, followed = worker.n_held, worker.followed
+    home = DISK if worker.laws.scene.table == CAP else GENERAL
     if worker.n_passed > 0 and not followed.lanes[j, 0] >= 0.0:
         followed.codes[j] = ANEW
         return
@@ -473,16 +475,16 @@ def next_hit(a, worker, waves, slope, degree):
     The lanes' answer is taken unless the end may come before: there the scalar step looks from both sides.
     """
     limit = (worker.stops.times[-1] - a[T]) - a[T_LOW]
-    a[STOP] = min(a[T] + limit * (1.0 - 4.0 * NEAR), worker.pieces.until)
-    is_stem, is_relative = worker.scene.table == STEM, worker.scene.is_relative
+    a[STOP] = min(a[T] + limit * (1.0 - 4.0 * NEAR), worker.laws.pieces.until)
+    is_stem, is_relative = worker.laws.scene.table == STEM, worker.laws.scene.is_relative
     while knows_laws(a, FIRST, worker):
-        fly_alone(a, is_stem, is_relative, waves, slope, degree, worker.limits)
+        fly_alone(a, is_stem, is_relative, waves, slope, degree, worker.laws.limits)
         if a[FATE] == MOVED or a[FATE] == MARKED:
             if a[T] >= a[END]:
-                set_reference(a, FIRST, a[T], a[T_LOW], worker.scene, worker.pieces, worker.degree)
+                set_reference(a, FIRST, a[T], a[T_LOW], worker.laws)
             return int(a[WALL])
         if a[FATE] == FAR and a[TRIES] <= MAX_CORRECTIONS:
-            set_reference(a, FIRST, a[T] + a[S], a[T_LOW], worker.scene, worker.pieces, worker.degree)
+            set_reference(a, FIRST, a[T] + a[S], a[T_LOW], worker.laws)
         elif a[FATE] != COARSE:
             break
     code, s, p = careful_flight(a, FIRST, worker)
@@ -504,7 +506,8 @@ def _path(is_slope_moving, form):
             How many there are, the last wall's code or what came instead, and how many steps lost no bit by
             `factors`, before the first that did: see `write_step`.
         """
-        waves, slope = worker.waves if is_waves else None, None if is_slope_moving else worker.slope
+        laws = worker.laws
+        waves, slope = laws.waves if is_waves else None, None if is_slope_moving else laws.slope
         states, a = worker.followed.states, worker.pools[GENERAL]
         load(a, FIRST, particle_at(states, 0, wall), False)
         code, n, n_exact = wall, 0, steps.shape[0]

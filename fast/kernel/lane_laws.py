@@ -323,44 +323,44 @@ def move_laws(a, i, delta, at_hit, waves, slope):
 
 
 @part
-def set_piece(a, i, piece, scene, pieces, degree):
+def set_piece(a, i, piece, laws):
     """Give a lane a piece of the laws whose reference time it has."""
-    a[PIECE + i], a[END + i] = piece, a[REF + i] + pieces.serves[piece]
-    a[BACK + i], a[LIMIT + i] = -pieces.limits[piece], pieces.limits[piece]
-    if scene.laws[RADIUS, KIND] == CONSTANT:
+    a[PIECE + i], a[END + i] = piece, a[REF + i] + laws.pieces.serves[piece]
+    a[BACK + i], a[LIMIT + i] = -laws.pieces.limits[piece], laws.pieces.limits[piece]
+    if laws.scene.laws[RADIUS, KIND] == CONSTANT:
         a[BACK + i] = -NEVER
     for row in range(4):
         # The lane has 0 where no piece has anything else.
-        n_coefficients = 1 if scene.laws[row, KIND] == CONSTANT else degree + 2
+        n_coefficients = 1 if laws.scene.laws[row, KIND] == CONSTANT else laws.degree + 2
         for j in range(n_coefficients):
-            a[LAWS + (row * N_COEFFICIENTS + j) * STRIDE + i] = pieces.coefficients[piece, row, j]
+            a[LAWS + (row * N_COEFFICIENTS + j) * STRIDE + i] = laws.pieces.coefficients[piece, row, j]
 
 
 @kernel
-def set_reference(a, i, t, t_low, scene, pieces, degree):
+def set_reference(a, i, t, t_low, laws):
     """Give a lane the piece of the laws that serves at a time; END is minus infinity where none does."""
-    if not abs(t) < pieces.until:
+    if not abs(t) < laws.pieces.until:
         a[END + i] = -NEVER
         return
-    piece, a[REF + i], a[REF_LOW + i] = piece_at(pieces, t, t_low)
-    set_piece(a, i, piece, scene, pieces, degree)
+    piece, a[REF + i], a[REF_LOW + i] = piece_at(laws.pieces, t, t_low)
+    set_piece(a, i, piece, laws)
 
 
 @kernel
-def know_laws(a, i, early, scene, pieces, degree, waves):
+def know_laws(a, i, early, laws):
     """Find a lane's laws at its time, of pieces by that which serves so much earlier.
 
     END is minus infinity where they are out of reach.
     """
     t, t_low = a[T + i], a[T_LOW + i]
-    if degree % 2 == 0:
-        set_reference(a, i, t - early, t_low, scene, pieces, degree)
-        if degree == PARABOLA:
-            read_pieces(a, i, R0 + i, 0.0, scene.is_relative, None, SHORT)
+    if laws.degree % 2 == 0:
+        set_reference(a, i, t - early, t_low, laws)
+        if laws.degree == PARABOLA:
+            read_pieces(a, i, R0 + i, 0.0, laws.scene.is_relative, None, SHORT)
         else:
-            read_pieces(a, i, R0 + i, 0.0, scene.is_relative, None, LONG)
-    elif abs(t) < pieces.until:
-        sine, _, cosine, _, _ = sine_cosine(waves.omega, waves.omega_low, 1.0, t, t_low)
+            read_pieces(a, i, R0 + i, 0.0, laws.scene.is_relative, None, LONG)
+    elif abs(t) < laws.pieces.until:
+        sine, _, cosine, _, _ = sine_cosine(laws.waves.omega, laws.waves.omega_low, 1.0, t, t_low)
         a[PHASE_SINE + i], a[PHASE_COSINE + i] = sine, cosine
         a[END + i] = NEVER
     else:

@@ -175,22 +175,50 @@ class LaneWaves(NamedTuple):
     m: tuple[float, ...]
 
 
+class LawLimits(NamedTuple):
+    """What holds of a scene's laws for all time, for the lanes' checks.
+
+    Attributes:
+        bend: at least |r'^2 + r r''|: half of what the arc's function may curve upwards, speed left out.
+        curvature: at least |w''| + |m''| h and |h''|, for a slope m.
+        turning: at least 2 |m'|, which comes times |vy| to a side's curvature.
+        rate: at least |r'|, |w'| + |m'| h and |h'|.
+        arc_rate: at least |r'|.
+        size: at least r + w + (1 + |m|) h, which bounds the terms that a wall's function is summed of.
+        lean: at least 1 + |m|.
+        lift: at least |h''| w / h: a rise short enough beside w / lift is short enough for the floor.
+    """
+
+    bend: float
+    curvature: float
+    turning: float
+    rate: float
+    arc_rate: float
+    size: float
+    lean: float
+    lift: float
+
+
 class LawsInLanes(NamedTuple):
     """A scene as the lanes know it: see fast.kernel.lane_laws.
 
     Attributes:
-        compiled: the scene's numbers.
+        scene: its numbers.
+        limits: what holds of its laws for all time.
         pieces: its laws as polynomials; of waves their period alone, and up to when they are known.
-        degree: of the polynomials, PARABOLA or SERIES of fast.kernel.lane_laws; or ONE_WAVE or TWO_WAVES.
-        slope: of the sides; None where it moves.
         waves: its laws as waves.
+        degree: of the polynomials, PARABOLA or SERIES of fast.kernel.lane_laws; or ONE_WAVE or TWO_WAVES.
+        is_slope_moving: the slope of the sides moves.
+        slope: what it is where it stands still.
     """
 
-    compiled: Compiled
+    scene: Compiled
+    limits: LawLimits
     pieces: Pieces
-    degree: int
-    slope: float | None
     waves: LaneWaves
+    degree: int
+    is_slope_moving: bool
+    slope: float
 
 
 class Particle(NamedTuple):

@@ -25,62 +25,16 @@ from numba import config, typeof, types
 from numba.core.typing import Signature
 from numba.core.typing import signature as returns
 
-from fast.kernel.arithmetic import SAFETY
 from fast.kernel.compiling import HOW, caller, kept, widest_registers
 from fast.kernel.lane_laws import DEGREES, NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, BEND, DEPTH, FASTEST, HIGHEST, LANES, LOWEST, POOL_SIZE, RADIUS, SLOPE, WIDTH, Compiled,
-    FloatArray, Followed, IntArray, LaneWaves, LawsInLanes, Particle, Pieces, Stops,
+    ANCHORS_SHAPE, LANES, POOL_SIZE, Compiled, FloatArray, Followed, IntArray, LawLimits, LawsInLanes,
+    Particle, Stops,
 )  # fmt: skip
 
 from fast.kernel.scalar_step import scalar_step
-
-LEAST_DEPTH = 2.0**-500  # where a bound says no more than that the depth is positive
-
-
-class LawLimits(NamedTuple):
-    """What holds of a scene's laws for all time, for the lanes' checks.
-
-    Attributes:
-        bend: at least |r'^2 + r r''|: half of what the arc's function may curve upwards, speed left out.
-        curvature: at least |w''| + |m''| h and |h''|, for a slope m.
-        turning: at least 2 |m'|, which comes times |vy| to a side's curvature.
-        rate: at least |r'|, |w'| + |m'| h and |h'|.
-        arc_rate: at least |r'|.
-        size: at least r + w + (1 + |m|) h, which bounds the terms that a wall's function is summed of.
-        lean: at least 1 + |m|.
-        lift: at least |h''| w / h: a rise short enough beside w / lift is short enough for the floor.
-    """
-
-    bend: float
-    curvature: float
-    turning: float
-    rate: float
-    arc_rate: float
-    size: float
-    lean: float
-    lift: float
-
-
-def limits_of(scene: Compiled) -> LawLimits:
-    """Return the limits of a scene's laws."""
-    r, w, h, m = (scene.bounds[row] for row in (RADIUS, WIDTH, DEPTH, SLOPE))
-    grow = 1.0 + SAFETY
-    lean = 1.0 + max(abs(m[LOWEST]), abs(m[HIGHEST]))
-    found = (
-        grow * (r[HIGHEST] * r[BEND] + r[FASTEST] * r[FASTEST]),
-        grow * max(w[BEND] + m[BEND] * h[HIGHEST], h[BEND]),
-        2.0 * m[FASTEST],
-        grow * max(r[FASTEST], w[FASTEST] + m[FASTEST] * h[HIGHEST], h[FASTEST]),
-        grow * r[FASTEST],
-        grow * (r[HIGHEST] + w[HIGHEST] + lean * h[HIGHEST]),
-        grow * lean,
-        grow * h[BEND] * w[HIGHEST] / max(h[LOWEST], LEAST_DEPTH),
-    )
-    return LawLimits(*map(float, found))
-
 
 # What the loops and the scalar step take and return, by samples.
 _PARTICLE, _TABLE = Particle(*(0.0,) * 6, 0), np.zeros((1, 1))
@@ -162,9 +116,7 @@ class Worker(NamedTuple):
     """What one thread needs to follow some particles.
 
     Attributes:
-        scene, limits: the scene, and what holds of it for all time.
-        pieces, waves, degree: its laws as the lanes know them.
-        slope: of the sides, where it stands still.
+        laws: the scene, as the lanes know it.
         loops: the compiled loops for laws of this degree and such a slope.
         anchors: room for its laws at one time.
         is_laned: the lanes may be used.
@@ -176,12 +128,7 @@ class Worker(NamedTuple):
         n_passed: stops passed before; if any, particles go on from `followed.lanes`.
     """
 
-    scene: Compiled
-    limits: LawLimits
-    pieces: Pieces
-    waves: LaneWaves
-    degree: int
-    slope: float
+    laws: LawsInLanes
     loops: Loops
     anchors: FloatArray
     is_laned: bool
@@ -214,15 +161,9 @@ def new_worker(
     in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed: int = 0, loops: Loops | None = None
 ) -> Worker:
     """Return a worker that holds no particle yet; with its scene's loops, or the given ones."""
-    scene = in_lanes.compiled
     return Worker(
-        scene,
-        limits_of(scene),
-        in_lanes.pieces,
-        in_lanes.waves,
-        in_lanes.degree,
-        0.0 if in_lanes.slope is None else in_lanes.slope,
-        loops or loops_for(in_lanes.slope is None, in_lanes.degree),
+        in_lanes,
+        loops or loops_for(in_lanes.is_slope_moving, in_lanes.degree),
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
         new_pools(),

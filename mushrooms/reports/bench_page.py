@@ -63,8 +63,7 @@ def to_markdown(record: Record, workload: str) -> str:
         "wrong walls",
         "of further steps",
     )
-    rows = [head, ("---",) * len(head)]
-    rows += [
+    rows = [
         (
             p.solver.replace("|", "\\|"),
             f"{statistics.median(p.ns):,.0f}",
@@ -76,25 +75,25 @@ def to_markdown(record: Record, workload: str) -> str:
         for p in record.points
         if p.workload == workload
     ]
-    return _as_table(rows)
+    return _as_table(head, rows)
 
 
 def _by_workload(record: Record) -> str:
     """Return what a collision takes in the lanes on each workload that they serve, beside the lean C."""
     ns = {(p.workload, p.solver): statistics.median(p.ns) for p in record.points}
     head = ("workload", "lanes, ns per collision", f"beside {BESIDE}", "lean C over lanes")
-    rows = [head, ("---",) * len(head)]
+    rows = []
     for name in (w.name for w in record.workloads):
         lanes, lean = (ns.get((name, solver)) for solver in ("fast, lanes", "lean C"))
         if lanes is not None:
             usual = ns.get((BESIDE, "fast, lanes"))
             parts = [None if usual is None else lanes / usual, None if lean is None else lean / lanes]
             rows.append((name, f"{lanes:,.0f}", *("–" if x is None else f"{x:.2g}" for x in parts)))
-    return _as_table(rows)
+    return _as_table(head, rows)
 
 
-def _as_table(rows: Sequence[Sequence[str]]) -> str:
-    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+def _as_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    return "".join(f"| {' | '.join(row)} |\n" for row in (head, ("---",) * len(head), *rows))
 
 
 def astray(p: Point) -> str:

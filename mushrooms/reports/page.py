@@ -28,9 +28,7 @@ def render(template: str, **fields: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["number"] = number
-    environment.filters["typeset"] = typeset
-    environment.filters["as_json"] = as_json
+    environment.filters |= {"number": number, "typeset": typeset, "as_json": as_json}
     return environment.get_template(template).render(version=__version__, **fields)
 
 

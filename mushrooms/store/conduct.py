@@ -211,7 +211,7 @@ def open_or_create(
     n_particles: int,
     block: int | None,
     default: int,
-    command: str,
+    name: str,
     resume: bool,
     *,
     at_least: bool = False,
@@ -224,7 +224,7 @@ def open_or_create(
         n_particles: as many as there are, or more: then it is widened.
         block: particles of a block; None for what is there, or `default`.
         default: for a new run.
-        command: that makes it.
+        name: of the scene, for the command that makes the run.
         resume: whether a run that is there may be gone on with.
         at_least: whether one that has more particles will do, and stays as large as it is.
 
@@ -236,8 +236,8 @@ def open_or_create(
     is_there = is_run(folder)
     if is_there:
         found = read_description(folder, spec, {} if block is None else {"block": block})
-        if at_least and found["particles"] > n_particles:
-            n_particles, command = found["particles"], found["command"]
+        if at_least:
+            n_particles = max(n_particles, found["particles"])
         _check_growth(folder, "particles", found["particles"], n_particles)
         if not resume:
             raise BadInput(f"output {str(folder)!r} holds this run: --resume goes on with it")
@@ -245,7 +245,7 @@ def open_or_create(
         least = -(-n_particles // MOST_BLOCKS)
         raise BadInput(f"--block = {found['block']}: {n_particles} particles need blocks of at least {least}")
     shape = shape_of(spec, n_particles, found["block"], found["cycles_of_a_chunk"])
-    run = StoredRun(folder, spec, shape, command)
+    run = StoredRun(folder, spec, shape, spec.command(name, n_particles, folder))
     damaged = run.check()
     _check_disk(run)
     if is_there:

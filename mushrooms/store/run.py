@@ -108,8 +108,7 @@ class StoredRun:
         self._markers: dict[int, Marker] = {}  # of the blocks on disk, those outgrown included
         self._arrays: dict[str, Any] = {}  # of the Zarr group, once it is open
         # The marker of another run, moved here with its files, does not count.
-        sizes = {"cycles": shape.chunked, "block": shape.block}
-        self._identity = _digest(spec.to_data() | sizes)
+        self._identity = _digest({**spec.to_data(), "cycles": shape.chunked, "block": shape.block})
 
     def missing(self) -> Iterator[BlockRange]:
         """Yield the blocks still to be followed, each with what is on disk to continue from.

@@ -59,10 +59,14 @@ class RunSpec(NamedTuple):
 
     def command(self, scene: str, n_particles: int, folder: Path) -> str:
         """Return the command that makes this run, or goes on with it."""
-        options: dict[str, object] = {"particles": n_particles, "energy": self.energy}
-        options |= {"cycles": self.n_cycles, "seed": self.seed}
-        options |= {"phases": ",".join(map(repr, self.phases))} if self.phases else {}
-        options["out"] = folder
+        options: dict[str, object] = {
+            "particles": n_particles,
+            "energy": self.energy,
+            "cycles": self.n_cycles,
+            "seed": self.seed,
+            **({"phases": ",".join(map(repr, self.phases))} if self.phases else {}),
+            "out": folder,
+        }
         words = [str(word) for name, value in options.items() for word in (f"--{name}", value)]
         return shlex.join(["mushrooms", "simulate", scene, *words, "--resume"])
 
@@ -78,12 +82,11 @@ def difference(stored: dict[str, Any], wanted: dict[str, Any]) -> str | None:
     stored, wanted = ({**data, "phases": data.get("phases", [])} for data in (stored, wanted))
     for name, value in wanted.items():
         found = stored.get(name)
-        if found == value:
-            continue
-        if isinstance(found, dict) and isinstance(value, dict):  # the scene: its first part that differs
-            part = next(key for key in {**found, **value} if found.get(key) != value.get(key))
-            return f"{name}: {part} = {found.get(part)!r} there, {value.get(part)!r} asked for"
-        return f"{name} = {found!r} there, {value!r} asked for"
+        # Of a scene, or a law, the first part that differs.
+        if found != value and isinstance(found, dict) and isinstance(value, dict):
+            return f"{name}: {difference(found, {**dict.fromkeys(found), **value})}"
+        if found != value:
+            return f"{name} = {found!r} there, {value!r} asked for"
     return None
 
 
@@ -182,8 +185,13 @@ class Shape(NamedTuple):
 
     def of(self, name: str, n: int, n_cycles: int) -> tuple[int, ...]:
         """Return the shape of an array for n particles and so many cycles."""
-        sizes = {"cycle": n_cycles, "narrowing": self.n_minima, "phase": self.n_phases}
-        sizes |= {"wall": len(WALLS), "row": int(LANE_ROWS)}
+        sizes = {
+            "cycle": n_cycles,
+            "narrowing": self.n_minima,
+            "phase": self.n_phases,
+            "wall": len(WALLS),
+            "row": int(LANE_ROWS),
+        }
         return (n, *(sizes[dim] for dim in FIELDS[name].dims[1:]))
 
     @property
@@ -206,8 +214,11 @@ def shape_of(spec: RunSpec, n_particles: int, block: int, chunked: int | None = 
 
 def columns(paused: Paused) -> Arrays:
     """Return the arrays that are stored of an ensemble."""
-    found = paused.ensemble._asdict()
-    found |= {"lanes": paused.lanes, "takes_part": paused.ensemble.takes_part()}
+    found = {
+        **paused.ensemble._asdict(),
+        "lanes": paused.lanes,
+        "takes_part": paused.ensemble.takes_part(),
+    }
     return {name: found[name].astype(field.kind, copy=False) for name, field in FIELDS.items()}
 
 

@@ -129,7 +129,7 @@ def _size(scene: Scene, t: float) -> tuple[float, float]:
 
 
 def careful_note(summary: Mapping[str, Any]) -> str | None:
-    """Return a line on careful steps if a run took a second of one core, a tenth of it for them, or more.
+    """Return a line on careful steps, if a run took a second of one core and they took over a tenth of it.
 
     Args:
         summary: as `mushrooms simulate` prints it.
@@ -209,9 +209,8 @@ def explain_limit(spec: RunSpec, summary: Mapping[str, Any]) -> str | None:
         return _explain_narrow_start(spec.scene)
     # Of one particle m1 has no error, and so no z, at an energy of which theory knows all the same.
     is_of_this_energy = any(summary[z] is not None for z in ("m1_z", "p_nc_z"))
-    if summary["m1_theory"] is None or summary["m1"] is None or is_of_this_energy:
-        return None
-    if not spec.scene.period:  # nothing moves: energies are what they were, at any energy
+    is_still = not spec.scene.period  # energies are what they were, at any energy
+    if summary["m1_theory"] is None or summary["m1"] is None or is_of_this_energy or is_still:
         return None
     return "m1_theory, p_nc_theory: the limit of high energies; what is left at this one is not known"
 

@@ -12,10 +12,10 @@ from types import ModuleType
 
 import numpy as np
 
-from fast.batch import LaneRound, as_particle, residual, take_careful_steps
+from fast.batch import LaneRound, residual, take_careful_steps
 from fast.kernel import lanes, records
 from fast.kernel.fine_step import FineState, fine_path
-from fast.kernel.records import DEPTH, RATE, FloatArray
+from fast.kernel.records import DEPTH, RATE, FloatArray, Particle
 from scene import Scene
 from support.lane_anywhere import Group, Start, draw_anywhere
 from support.lane_draws import AIMS, draw_aimed
@@ -67,14 +67,15 @@ class Round(LaneRound):
 
     def call_loop(self, a: list[float], count: int) -> None:
         """Call the loop of the kernels that `follow.advance` calls."""
-        of, limits, k = self.in_lanes, self.worker.limits, self.kernels
+        of, k = self.in_lanes, self.kernels
         waves = of.waves if of.degree in (k.ONE_WAVE, k.TWO_WAVES) else None
         step = k.chord if self.is_disk else k.fly
-        step(a, count, self.worker.scene, waves, of.slope, (0,) * of.degree, limits)
+        slope = None if of.is_slope_moving else of.slope
+        step(a, count, of.scene, waves, slope, (0,) * of.degree, of.limits)
 
     def correct_lane(self, a: list[float], i: int) -> None:
         """Correct a step that is not yet right again, as the next rounds do."""
-        k, known = self.kernels, (self.compiled, self.in_lanes.pieces, self.in_lanes.degree)
+        k = self.kernels
         spare = [0.0] * records.POOL_SIZE
         k.copy_rows(a, i, spare, 0, 0, records.POOL_SIZE)
         while (
@@ -83,7 +84,7 @@ class Round(LaneRound):
         ):
             if spare[records.FATE] == records.FAR:
                 t = spare[records.T] + spare[records.S]
-                k.set_reference(spare, 0, t, spare[records.T_LOW], *known)
+                k.set_reference(spare, 0, t, spare[records.T_LOW], self.in_lanes)
             self.call_loop(spare, 1)
         k.copy_rows(spare, 0, a, i, 0, records.POOL_SIZE)
 
@@ -110,7 +111,7 @@ class Round(LaneRound):
 
     def is_floor_met_at_once(self, p: FloatArray) -> bool:
         """Tell whether a start is above the floor by no more than rounding, in pairs of floats, and falls."""
-        f, error = residual(as_particle(p, int(records.FLOOR)), self.compiled, self.anchors)
+        f, error = residual(Particle._make((*p.tolist(), int(records.FLOOR))), self.compiled, self.anchors)
         return bool(0.0 < f <= error and p[5] + self.anchors[DEPTH, RATE] < 0.0)
 
     def ulps(self, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray) -> float | None:

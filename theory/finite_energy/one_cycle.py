@@ -26,7 +26,6 @@ from theory.volumes import NotCovered, as_mushroom
 
 N_PLACES = 2000  # at which distribution functions are computed; linear between them
 N_CAPTURES = 600  # point masses of a well that lies in no other; of one among several a fifth
-MOST_MASSES = 40_000  # of several captures; more are joined with their neighbours in gain
 MOST_DRAWN = 100_000_000
 LATE = 16  # steps of a cycle, by which times may miss it: captures are seen from arc hit to arc hit
 REACH = 7.0  # standard deviations beyond which no kernel is computed
@@ -320,7 +319,7 @@ class FiniteEnergy:
         for branch in node.branches:
             stays = _stays(node, branch, self._n_captures, root.s_nc)
             parts += [self._captured(masses, now, stays, end)]
-        return _joined(parts), end
+        return PointMasses(*(np.concatenate(columns) for columns in zip(*parts, strict=True))), end
 
     def _captured(
         self, masses: PointMasses, now: float, stays: tuple[Floats, ...], end: float
@@ -376,21 +375,3 @@ def _stays(node: Node, branch: Branch, n: int, s_nc: float) -> tuple[Floats, ...
     middle = (edges[1:] + edges[:-1]) / 2
     _, t_in, t_out, *_ = branch.evaluate(middle)
     return t_in, t_out, at(branch.s, middle) - s_nc, -np.diff(branch.chaotic(edges)) / node.p_top
-
-
-def _joined(parts: list[PointMasses]) -> PointMasses:
-    """Put point masses together; where they are too many, join neighbours in gain."""
-    whole = PointMasses(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-    n = len(whole.gain)
-    if n <= MOST_MASSES:
-        return whole
-    order = np.lexsort((whole.gain, whole.is_free))
-    _, group = np.unique(
-        np.arange(n) * (MOST_MASSES // 2) // n + MOST_MASSES * whole.is_free[order], return_inverse=True
-    )
-    weight = np.bincount(group, whole.weight[order])
-
-    def middle(column: Floats) -> Floats:
-        return np.asarray(np.bincount(group, (whole.weight * column)[order]) / weight, dtype=np.float64)
-
-    return PointMasses(np.asarray(weight), *(middle(column) for column in whole[1:]))

@@ -30,6 +30,7 @@ from conformance.audit.tolerances import (
     share,
     spread,
     stated,
+    steepest,
 )
 from scene import load
 
@@ -152,11 +153,9 @@ def peak_band(found: theory.FiniteEnergy) -> float:
 def captured_band(sample: Sample) -> float:
     """Return the same of the captured: a kernel's change moves them no more than it does the peak."""
     found = predicted(sample)
-    gains = sample.gain[sample.captured]
-    places = np.linspace(gains.min(), gains.max(), 400)
-    steepest = float(np.max(np.diff(found.captured_cdf(places)) / np.diff(places)))
-    left = found.theory_error
-    return steepest * left.captured_mean + WIDENED * left.variance + SKEWED * left.skewness
+    gains, left = sample.gain[sample.captured], found.theory_error
+    steep = steepest(found.captured_cdf, gains.min(), gains.max())
+    return steep * left.captured_mean + WIDENED * left.variance + SKEWED * left.skewness
 
 
 def zone_energy(sample: Sample) -> tuple[list[float], list[Mean]]:

@@ -152,7 +152,9 @@ def _told_from_a_gaussian(sample: Sample, n: int) -> Check:
     label, sums = f"{sample.run.name}, n = {n}", summed(sample.run.name, n)
     total, drawn = ((x - sums.mean) / sums.sd for x in (sample.s[:, n - 1], sums.values))
     edges = np.linspace(-3.5, 3.5, 29)
-    counts, likely = (_binned(x, edges) for x in (total, drawn))
+    counts, likely = (
+        np.bincount(np.searchsorted(edges, x), minlength=len(edges) + 1).astype(float) for x in (total, drawn)
+    )
     p, q = likely / likely.sum(), np.diff(norm.cdf([-np.inf, *edges, np.inf]))
     weight = np.log(p / q)
     mine, its = float(p @ weight), float(q @ weight)
@@ -171,10 +173,6 @@ def _told_from_a_gaussian(sample: Sample, n: int) -> Check:
         ),
         against=("a Gaussian", its),
     )
-
-
-def _binned(values: FloatArray, edges: FloatArray) -> FloatArray:
-    return np.bincount(np.searchsorted(edges, values), minlength=len(edges) + 1).astype(float)
 
 
 def independence(evidence: ClaimEvidence) -> Iterator[Check]:

@@ -28,6 +28,20 @@ def test_no_lane_answer_is_wrong(group, tally):
     assert search(11, N_ANSWERS, tally, group) == []
 
 
+@pytest.mark.parametrize("column", range(5))
+def test_a_spoilt_lane_is_seen(column, monkeypatch, tally):
+    """The comparison notices numbers that are off by 2^-47."""
+    honest = Round.step
+
+    def spoilt(pool, n):
+        right, hits, numbers = honest(pool, n)
+        numbers[:, column] *= 1.0 + 2.0**-47
+        return right, hits, numbers
+
+    monkeypatch.setattr(Round, "step", spoilt)
+    assert search(1, 100, tally, "arc to base") != []
+
+
 def test_lanes_alone_take_the_careful_steps_and_no_free_starts(tally):
     random = np.random.default_rng(8)
     for _ in range(12):

@@ -11,7 +11,7 @@ from support.depth import deep_among
 from support.faulty_kernels import faulty_lanes
 from support.lane_anywhere import draw_anywhere
 from support.lane_corners import CORNERS
-from support.lane_search import ANYWHERE, GROUPS, Round, search
+from support.lane_search import GROUPS, Round, search
 
 import fast
 import reference
@@ -101,8 +101,8 @@ MUTANTS = {
     ),
     "the sides before the mouth": ("side to arc", 300, "else gap - doubt", "else 1.0"),
     "concavity of the arc": (
-        ANYWHERE,
-        4000,
+        "arc to base",
+        300,
         "min(v2 - bend, pushed)",
         "pushed",
         *POORER_GUESS,
@@ -248,7 +248,6 @@ def test_uncompiled_lanes_give_the_bits_of_compiled_ones(group):
     "name",
     deep_among(
         MUTANTS,
-        "concavity of the arc",
         "how long the polynomials hold",
         "how long the radius was known before",
         "the slope of the side that is met",

@@ -6,9 +6,11 @@ from itertools import product
 import numpy as np
 import pytest
 from msgspec.structs import replace
-from support.lane_anywhere import draw_scene
 
 import fast
+from conformance.cases.draw import Draw
+from conformance.cases.scenes import MOVING, TABLES, clock
+from conformance.cases.scenes import scene as drawn_scene
 from fast import ensemble, pieces
 from fast.ensemble import one_cycle
 from fast.kernel import follow
@@ -78,7 +80,8 @@ def test_slow_particles_of_drawn_scenes_go_on_alike(tally):
     """A flight lasts for several stops, and for several pieces of the laws; many steps are scalar ones."""
     random = np.random.default_rng(11)
     while tally["runs"] < N_DRAWN:
-        scene = draw_scene(random)
+        draw = Draw(f"goes/{tally['runs']}")
+        scene = drawn_scene(draw, draw.pick(TABLES), clock(draw, MOVING))
         phases = sorted(random.uniform(0.01, 0.99, int(random.integers(0, 8))).tolist())
         energy = float(10.0 ** random.uniform(-1, 2)) / one_cycle(scene) ** 2
         cuts, asked = cuts_of(random, 5), {"n_particles": 30, "energy": energy, "phases": phases}

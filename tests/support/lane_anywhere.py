@@ -5,6 +5,7 @@ as the walls or quicker.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -26,18 +27,12 @@ class Group(NamedTuple):
     is_captured: bool = False
 
 
-def draw_scene(random: np.random.Generator) -> Scene:
-    """Draw a scene as the suite does."""
-    while True:
-        try:
-            return any_scene(Draw(f"lanes/{random.integers(2**32)}"))
-        except Unfit:
-            continue
-
-
 def draw_anywhere(n: int, random: np.random.Generator) -> Starts:
     """Draw a scene and n starts on its walls."""
-    scene, draw = draw_scene(random), Draw(f"starts/{random.integers(2**32)}")
+    draw, scene = Draw(f"lanes/{random.integers(2**32)}"), None
+    while scene is None:
+        with suppress(Unfit):
+            scene = any_scene(draw)
     walls = ("arc",) if isinstance(scene, Cap) else scene.walls
     starts = []
     for _ in range(n):

@@ -77,6 +77,11 @@ def test_a_tie_at_an_irrational_time_stays_undecided():
         (STATIC, State(0, 0.5, 1e-17, -1.0, -0.1, "right"), "above the stem|beyond wall base"),
         # At t = pi the radius is 1e-3: 1e-4 is not on the arc, however large r will be.
         (Cap(r=Fourier(1.0, 1.0, (0.999,))), State(math.pi, 0, 1e-4, 0, -1, "arc"), "away from that wall"),
+        (
+            Cap(r=Fourier(1.0, 1.0, (0.999,))),
+            State(math.pi, 0, 1.000005e-3, 0, -1, "arc"),
+            "beyond wall arc|away",
+        ),
     ],
 )
 def test_bad_states_are_rejected(stepper, scene, state, words):

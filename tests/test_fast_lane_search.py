@@ -210,8 +210,8 @@ MUTANTS = {
         "SAFETY * size",
     ),
     "the floor before the mouth": (
-        "corner over a rising floor",
-        100,
+        "rising floor",
+        6000,
         "else k_side + limits.lift",
         "else k_side",
     ),

@@ -3,8 +3,6 @@
 The functions are imported on first use, because importing numba takes half a second.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

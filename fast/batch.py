@@ -4,8 +4,6 @@ Ensembles and flows mix scalar step and lanes; here each is alone, so that its a
 its time measured.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from typing import Any

@@ -8,8 +8,6 @@ Particle i draws its start from block i of a counter-based random stream (Philox
 same particle whatever the number of particles, threads or chunks.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import time

@@ -7,8 +7,6 @@ which it ends, or the hit after which an energy is reached. A flow carries parti
 are followed.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Sequence

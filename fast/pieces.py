@@ -13,8 +13,6 @@ a law changes by more than half of itself in a piece (a radius that comes down t
 piece is halved again: else the rounding of the terms would be far more than that of their sum.
 """
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """The fast stepper: one step, and the form of states and outcomes in the kernels."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable, Sequence
 
@@ -13,6 +11,7 @@ from fast.kernel.worker import careful_at
 from fast.units import ANSWER_LOST, LateTime, Units, fit
 from fast.validation import MOST_TO_A_TIME
 from scene import (
+    BadInput,
     Collision,
     Horizon,
     InvalidState,
@@ -26,7 +25,6 @@ from scene import (
     check_scene,
 )
 from scene.geometry import placed, rounded
-from scene.refusal import BadInput
 from scene.states import check_numbers
 
 WALL_NAMES: dict[int, Wall] = {

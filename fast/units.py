@@ -12,8 +12,6 @@ least of all floats, beside a table of common size, comes in exactly too. `compi
 the numbers that the kernels read.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from fractions import Fraction
@@ -32,9 +30,8 @@ from fast.kernel.records import (  # isort: skip
     BANG_BANG, CONSTANT, FOURIER, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, BoolArray, Compiled,
     FloatArray, IntArray,
 )  # fmt: skip
-from scene import BangBang, Cap, Fourier, InvalidState, Law, Mushroom, Scene, State
+from scene import BadInput, BangBang, Cap, Fourier, InvalidScene, InvalidState, Law, Mushroom, Scene, State
 from scene.laws import Bounds, bounds, is_constant, size_bounds
-from scene.refusal import BadInput, InvalidScene
 from scene.tables import laws, period, width_factors
 from scene.transforms import scaled_law, times_power
 

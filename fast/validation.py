@@ -4,8 +4,6 @@ Each check returns its argument as the kernels take it (floats, integers), or ra
 line that names field, value and bound.
 """
 
-from __future__ import annotations
-
 import math
 import numbers
 import os

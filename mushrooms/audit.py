@@ -3,8 +3,6 @@
 DIR/runs/NAME is what `mushrooms simulate --out` makes, here or elsewhere.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable, Sequence

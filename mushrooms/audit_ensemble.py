@@ -5,8 +5,6 @@ cycle, or s = log E1/E0; where there are any, t_in and t_out (ends of the first 
 captured (0 or 1), and x0, y0, where it started. The names that `mushrooms export` writes will do.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Iterable, Iterator

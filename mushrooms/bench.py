@@ -3,8 +3,6 @@
 Our steppers are among the solvers that are measured, and the proofs are what all are measured against.
 """
 
-from __future__ import annotations
-
 import math
 import tempfile
 import time

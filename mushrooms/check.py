@@ -1,7 +1,5 @@
 """`mushrooms check`: the conformance suite on a command, with its progress, summary and report files."""
 
-from __future__ import annotations
-
 import secrets
 import shlex
 from collections.abc import Callable, Mapping
@@ -13,8 +11,7 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 from conformance.files import write_file
-from conformance.suite import check, read_known, reports
-from conformance.suite.result import VERDICTS, Run
+from conformance.suite import VERDICTS, Run, check, read_known, reports
 from conformance.suite.run import NEW_SEEDS, choose
 from conformance.suite.session import Limits
 from conformance.suite.sheet import (

@@ -4,8 +4,6 @@ This module imports typer and the standard library alone. The body of each comma
 does its work, and hands it the options in their order; so no `--help` waits for numba or matplotlib.
 """
 
-from __future__ import annotations
-
 import math
 from decimal import Decimal, InvalidOperation
 from pathlib import Path

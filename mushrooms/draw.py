@@ -1,7 +1,5 @@
 """`mushrooms draw`: a table through its cycle, and what particles do in it; the export of a trajectory."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO, NamedTuple

@@ -5,8 +5,6 @@ are written as NAME.svg. The blocks of a page share their names, as a notebook's
 pictures of all pages, and the tests run the same blocks.
 """
 
-from __future__ import annotations
-
 import re
 from functools import partial
 from pathlib import Path

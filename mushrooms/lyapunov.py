@@ -11,8 +11,6 @@ to 0.
 The Jacobians belong to the states in binary64. Each is right to some 16 digits.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple

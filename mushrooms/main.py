@@ -3,8 +3,6 @@
 Bad input of any kind is one line on stderr and exit code 2.
 """
 
-from __future__ import annotations
-
 import errno
 import io
 import os

@@ -1,7 +1,5 @@
 """What commands share: results as lines, what is shown while one waits, files, folders, tables as files."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

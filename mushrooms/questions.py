@@ -3,8 +3,6 @@
 A question is a case of the test suite, a draw of a family of nasty questions, or a step of a trajectory.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

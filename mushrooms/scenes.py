@@ -1,7 +1,5 @@
 """`mushrooms scenes` and `theory`: the catalogue, a scene as a file, what theory predicts for one cycle."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys

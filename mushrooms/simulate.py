@@ -1,7 +1,5 @@
 """`mushrooms simulate`: an ensemble on a scene, its summary, its run on disk and its histogram."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -1,7 +1,5 @@
 """What the reference answers: enclosures of a collision, a horizon or a trajectory."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 

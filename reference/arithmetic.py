@@ -6,8 +6,6 @@ says 0 when an interval does not decide. Each Arithmetic owns its context, so th
 different precisions do not disturb each other, and mpmath's global precision is never touched.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from decimal import Decimal

@@ -5,8 +5,6 @@ exact instant within that enclosure. There place and velocity are boxes and the 
 flight itself begins a little before or after, at an enclosed flight time (`EnclosedFlight.begin`).
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import NamedTuple
 

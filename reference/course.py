@@ -7,8 +7,6 @@ the precision does not decide. Only `reference.rational` proves equalities. docs
 answer claims, and why.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass

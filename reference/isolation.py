@@ -22,8 +22,6 @@ be known only within `begin`. On a sub-interval that does not begin after it, f 
 be concave with all of `begin` inside.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple

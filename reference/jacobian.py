@@ -11,8 +11,6 @@ The second derivatives jump at a knot. Rounding may put a hit on either side of 
 binary64 resolves the time of the hit, so both sides' derivatives are enclosed there.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 from reference.arithmetic import Arithmetic, Enclosure, Interval, exact_ends

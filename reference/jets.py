@@ -1,7 +1,5 @@
 """A function with its first two derivatives: enclosures over an interval of time, or exact numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Margins of a collision: how much must change until another answer is right."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from reference.arithmetic import Arithmetic, Enclosure, Interval, Undecidable

@@ -4,8 +4,6 @@ All steps are taken at one working precision; when the last state is not enclose
 the whole trajectory begins again at twice that. What is claimed, and why it follows: docs/proof.md.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from fractions import Fraction
@@ -17,8 +15,7 @@ from reference.course import Course, Hit
 from reference.jacobian import Matrix, chained, enclosures, identity, step_jacobian
 from reference.start import depart
 from reference.step import GUARD_DIGITS, MAX_DIGITS, checked_digits, require_digits
-from scene import Scene, State, Undecided, Undefined
-from scene.refusal import check_count, check_number
+from scene import Scene, State, Undecided, Undefined, check_count, check_number
 from scene.states import check_numbers
 
 MAX_COLLISIONS = 1_000_000

@@ -1,7 +1,5 @@
 """The start of a path: its part of the table, the wall it leaves, or why it is refused."""
 
-from __future__ import annotations
-
 from decimal import Decimal
 from fractions import Fraction
 

@@ -4,8 +4,6 @@
 `Undecided`. What is claimed, and why it follows: docs/proof.md. Many steps: `reference.path`.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 
@@ -16,8 +14,7 @@ from reference.course import Hit
 from reference.jacobian import enclosures, step_jacobian
 from reference.margins import measure
 from reference.start import depart
-from scene import InvalidState, Rejected, Scene, State, Undecided, Undefined, check_scene
-from scene.refusal import check_count
+from scene import InvalidState, Rejected, Scene, State, Undecided, Undefined, check_count, check_scene
 from scene.states import check_numbers
 
 GUARD_DIGITS = 15

@@ -9,8 +9,6 @@ where L_j is the derivative of order j, and M = sum (k w)^ORDER (|a_k| + |b_k|) 
 all times. The derivatives at m are sums over waves too, but of numbers and not of intervals.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from functools import cached_property
 

@@ -7,8 +7,6 @@ returns that piece. `evaluate` works in each of mpmath's number systems (`mp`, `
 so one definition serves points, floats and enclosures.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from bisect import bisect_right

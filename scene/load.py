@@ -1,7 +1,5 @@
 """Scenes from the catalogue, from TOML or JSON files, and from decoded data."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -10,8 +10,6 @@ A swing of nu below SWING of its largest value is rounding, and counts as none: 
 peak are one, and a nu that never swings more has no minimum at all. A plateau counts once, by its middle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from fractions import Fraction
 from functools import lru_cache

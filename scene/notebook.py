@@ -1,7 +1,5 @@
 """What a notebook shows of a scene, a prediction, an ensemble: plain HTML, with no plotting library."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from html import escape
 

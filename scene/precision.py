@@ -7,8 +7,6 @@ two variables that all systems share: a thread that reads one before and the oth
 wrong pi. Proofs therefore read it with the lock CONSTANTS held.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from typing import Any

@@ -4,8 +4,6 @@ A public entry checks what it is given before any arithmetic, so that a wrong ty
 line that names the field, the value and the bound, never in a traceback from deep inside.
 """
 
-from __future__ import annotations
-
 import math
 import numbers
 from typing import Any

@@ -1,7 +1,5 @@
 """States of a particle and outcomes of a step, in the form they have on the wire."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Literal
 

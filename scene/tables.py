@@ -16,8 +16,6 @@ faster is written with higher harmonics (the k-th number of `cos` and `sin` belo
 repeated knots.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from functools import lru_cache

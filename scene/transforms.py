@@ -4,8 +4,6 @@ A transformed scene has neither name nor notes, and is proved valid like any oth
 images and powers of two are exact as long as no number overflows or becomes subnormal.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, TypeVar

@@ -15,8 +15,6 @@ An interval is done if all of that is positive; otherwise it is halved. Near a c
 enough. The search then ends and reports where.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction

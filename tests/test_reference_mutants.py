@@ -147,7 +147,7 @@ def law_of_reflection():
 def slow_across_periods():
     """Particles that come to a wall within thousands of periods, whose waves never are all at their least."""
     draw = random.Random(3)
-    for _ in range(4):
+    for _ in range(2):
         law = Fourier(mean=1.0, period=1.0, sin=(0.1, 0.02, draw.uniform(-0.02, 0.02)), cos=(0.05,))
         v, t = 10.0 ** -draw.uniform(2.5, 5.5), draw.random()
         for wall, scene, q in (

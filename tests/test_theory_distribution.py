@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from support.depth import deep_among, deep_but
 
-import theory
 from scene import BangBang, Fourier, Mushroom, load
 from scene.transforms import scaled
 from theory import (
@@ -475,22 +474,22 @@ solve = cache(energies)
 
 def kept(scene: Mushroom) -> float:
     """Return the probability of being captured while the loop runs back along itself."""
-    return 1 - float(theory.chaotic_zone(scene, [float(theory.Cycle.of(scene, 8).t_in(0.5))]).p_cha[0])
+    return 1 - float(chaotic_zone(scene, [float(Cycle.of(scene, 8).t_in(0.5))]).p_cha[0])
 
 
 def has_its_atom(scene: Mushroom) -> bool:
-    below, at = theory.energies(scene).cdf(np.array([-1e-12, 0.0]))
+    below, at = energies(scene).cdf(np.array([-1e-12, 0.0]))
     return abs(at - below - kept(scene)) < 1e-9
 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_who_ends_with_one_energy_is_counted_as_one(scene: Mushroom) -> None:
     assert has_its_atom(scene)
-    assert has_its_atom(theory.reversed_cycle(scene))
+    assert has_its_atom(reversed_cycle(scene))
     levels = [-1e-12, 0.0, 1e-12]
-    many = [float(p) for p in theory.cdf_at(scene, levels, 8)]
+    many = [float(p) for p in cdf_at(scene, levels, 8)]
     assert many == pytest.approx(solve(scene).cdf(np.array(levels)).tolist(), abs=1e-8)
-    assert theory.density_at(scene, [0.0], 8) == (0,)
+    assert density_at(scene, [0.0], 8) == (0,)
 
 
 def test_telling_them_apart_by_rounding_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -501,7 +500,7 @@ def test_telling_them_apart_by_rounding_is_found_out(monkeypatch: pytest.MonkeyP
 
 def drawn_losses(scene: Mushroom, n_cycles: int) -> tuple[float, float]:
     """Draw the share of E_n < E_0, and its error, in cycles with one interval of capture."""
-    curve, found = theory.capture_curve(scene, 100_001), solve(scene)
+    curve, found = capture_curve(scene, 100_001), solve(scene)
     u = np.random.default_rng(7).random((200_000, n_cycles))
     gain = np.interp(u, curve.p_cha[::-1], curve.s[::-1])
     share = (np.where(u < found.p_nc, found.s_nc, gain).sum(axis=1) < -1e-9).mean()
@@ -509,10 +508,10 @@ def drawn_losses(scene: Mushroom, n_cycles: int) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
-@pytest.mark.parametrize("scene", [SCENES[0], theory.reversed_cycle(SCENES[0])])
+@pytest.mark.parametrize("scene", [SCENES[0], reversed_cycle(SCENES[0])])
 def test_who_keeps_the_energy_is_not_lost(scene: Mushroom, n: int) -> None:
     share, error = drawn_losses(scene, n)
-    assert theory.loss_probability(solve(scene), n) == pytest.approx(share, abs=5 * error)
+    assert loss_probability(solve(scene), n) == pytest.approx(share, abs=5 * error)
     atom = kept(scene) ** n  # half of it is what a lattice that shares the atom would count, or all
     assert atom / 2 > 5 * error or n == 3
 
@@ -522,10 +521,10 @@ def test_the_uncaptured_of_a_loop_that_is_its_own_reverse_are_not_lost(n: int) -
     """By p(-s) = p(s) exp(-s): the lost are the mean of exp(-S) over S > 0."""
     found = solve(load("retraced-arc"))
     assert found.s_nc == 0
-    sums = theory.sum_of_cycles(found, n)
+    sums = sum_of_cycles(found, n)
     s = np.linspace(0.0, n * 3.0, 100_001)
     p = 1 - sums.cdf(s)
-    p[0] = 1 - theory.loss_probability(found, n) - found.p_nc**n
+    p[0] = 1 - loss_probability(found, n) - found.p_nc**n
     gained = p[0] - np.trapezoid(np.exp(-s) * p, s)
-    assert theory.loss_probability(found, n) == pytest.approx(gained, rel=3e-4)
+    assert loss_probability(found, n) == pytest.approx(gained, rel=3e-4)
     assert float(sums.cdf(0.0)) > gained + 0.4 * found.p_nc**n  # a distribution function has them

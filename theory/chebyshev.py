@@ -14,8 +14,6 @@ are replaced by weights on a grid over their range. The weights give all polynom
 the same mean, so means of analytic functions converge geometrically; some of them may be negative.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from operator import mul
 from typing import Any

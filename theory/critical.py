@@ -7,8 +7,6 @@ repeated division gives its multiplicity, so no critical point is missed however
 are. Between neighbouring ones nu is strictly monotone or at rest.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import pairwise

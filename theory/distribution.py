@@ -14,8 +14,6 @@ I = -min log Phi (Cramer 1938). Phi is convex, Phi(-1) = Phi(0) = 1: its minimum
 cycle has Phi(-1 - q) for Phi(q), hence the same I; a loop that is its own reverse has its minimum at -1/2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple

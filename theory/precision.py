@@ -12,8 +12,6 @@ numbers are checked by `scene.refusal`; here are the checks of number systems, n
 arrays, and bounds.
 """
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Callable, Iterable

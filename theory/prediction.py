@@ -10,8 +10,6 @@ belong to no number system, and each caller's figures to that of its own cycle: 
 in another thread, and nobody else is touched.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import lru_cache, partial

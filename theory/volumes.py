@@ -7,8 +7,6 @@ an `MPContext` for many digits, `numpy` for arrays. Intervals are not handled.
 Invariants and rates of energy follow from them.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

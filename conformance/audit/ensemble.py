@@ -12,8 +12,6 @@ its own, and no more than a third as far off as theory's.
 Not handled: starts of several energies, tables other than mushrooms.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -42,10 +40,9 @@ from conformance.audit.tolerances import (
     stated,
     steepest,
 )
-from scene import Mushroom
+from scene import BadInput, Mushroom
 from scene.geometry import half_width, table_at
 from scene.laws import bounds, values
-from scene.refusal import BadInput
 from scene.transforms import backwards
 from theory.finite_energy.one_cycle import TheoryError
 

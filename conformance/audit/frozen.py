@@ -17,8 +17,6 @@ All are of tables at rest: nothing is taken from a moving one, or fitted to it. 
 them, `theory/equations.md` says what follows. `python -m conformance.audit.frozen` measures them anew.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import sys

@@ -4,8 +4,6 @@ Every finding is saved in the results' folder; `resume` takes up those that the 
 same settings. Whether particles are kept is up to the caller, by `simulate_run`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import time

@@ -29,7 +29,7 @@ import msgspec
 from mpmath import fp
 
 from conformance.suite.process import CheckFailure, Process, Transcript, clean, excerpt
-from scene import Collision, Outcome, from_data
+from scene import BadInput, Collision, Outcome, from_data
 from scene.geometry import table_at
 from scene.protocol.messages import (
     PROTOCOL,
@@ -44,7 +44,6 @@ from scene.protocol.messages import (
     Timed,
     with_minus_zeros,
 )
-from scene.refusal import BadInput
 
 AnswerLine = Callable[[bytes], bytes]
 T = TypeVar("T")

@@ -8,8 +8,6 @@ A pair (high, low) stands for the sum high + low, |low| at most half a unit in t
 31 decimals. `add`, `mul`, `div` and the like are right to a few units of 2^-104.
 """
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from typing import Any

@@ -6,8 +6,6 @@ a long one that several call costs more as a part, whose text is copied and type
 need is called by its address.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import shutil

@@ -11,8 +11,6 @@ Nor is the place after a long flight: it keeps 2^-104 of the way. A hop that lea
 2^-24 of the particle's speed may be undecided: its time is not known to `LOOSE`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

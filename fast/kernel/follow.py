@@ -18,8 +18,6 @@ the laws is kept by its number and reference time. It is not always the one that
 flight that ran out of its piece was given another in mid-flight.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from fast.kernel.arithmetic import dot, fma

@@ -12,8 +12,6 @@ lane is given the next. Why the polynomials may be trusted is said where they ar
 number in FORMS, so that each form is compiled by itself.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -16,8 +16,6 @@ a wall that is not met has f > K s^2 at the end, so that f was positive all alon
 |f'| > K s, or f is concave. A flight costs two divisions and one square root.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -15,8 +15,6 @@ A size is used as if its value were right to a unit or two in its last place. It
 further, and a mouth all but closes, the phases are found again to twice as many digits (`is_cancelled`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from fast.kernel.arithmetic import (

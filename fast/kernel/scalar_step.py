@@ -17,8 +17,6 @@ the time's low part; on the wall that was left, for a short re-collision, the in
 better. So place, wall speed and velocity are as accurate as their last rounding.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from fast.kernel.arithmetic import SAFETY, fma, two_product, two_sum

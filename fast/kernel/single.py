@@ -5,8 +5,6 @@ one array and the answer a tuple. Nothing is kept between calls, so that threads
 refused here is refused by the checks in Python too, which say why.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -4,8 +4,6 @@ A wall function is a sum of a few products of rounded numbers, so `SAFETY` times
 sizes bounds its error; every value of f comes with such a bound. Source: sec. 2, D_stem and D_cap.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from fast.kernel.arithmetic import SAFETY, dot, fma, mul, products, quotient, two_product, two_sum

@@ -12,8 +12,6 @@ take minutes. So the main thread, where signals are handled, only waits for thos
 off what they do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager

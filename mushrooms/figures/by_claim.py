@@ -4,8 +4,6 @@ They show one cycle and many, laws through the cycle and against energy, and the
 over the simulation.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial

@@ -5,8 +5,6 @@ cycles. A run too large for memory gives them block by block. Below a histogram 
 the theory at this energy. For scenes without measured rates the limit of high energies is drawn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import chain

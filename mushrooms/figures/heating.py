@@ -9,8 +9,6 @@ convex in (a, b), so a and b are at opposite bounds. The best loop is anticlockw
 mouths, and clockwise where V is small. It changes direction at one width, the switch.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

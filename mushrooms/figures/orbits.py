@@ -4,8 +4,6 @@ Each function returns a matplotlib figure, which a notebook shows; `save` of `mu
 one. Captured is blue, free is orange, in all of them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, BinaryIO

@@ -4,8 +4,6 @@ The palette is Okabe and Ito's, told apart by colour-blind readers, and viridis 
 blue and filled, theory orange or black lines.
 """
 
-from __future__ import annotations
-
 import io
 import re
 import warnings

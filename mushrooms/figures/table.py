@@ -1,7 +1,5 @@
 """Pictures of a table: its walls through the cycle, a few chords of one trajectory, an animation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, BinaryIO

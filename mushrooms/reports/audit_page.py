@@ -3,8 +3,6 @@
 docs/report.schema.json defines the fields of report.json.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform

@@ -1,7 +1,5 @@
 """The pages and figures of the benchmark: speed against error, error growth, and the numbers behind them."""
 
-from __future__ import annotations
-
 import math
 import statistics
 from collections.abc import Sequence

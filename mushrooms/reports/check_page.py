@@ -5,8 +5,6 @@ the errors by precision class, and the implementation's point in the plane of sp
 paths have one meaning in all figures, explained once on the page (`LEGEND`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -18,8 +16,7 @@ from matplotlib.figure import Figure
 
 from conformance import vectors
 from conformance.grading.agreement import FAIR, SHARP, middle
-from conformance.suite import reports
-from conformance.suite.result import Result, Run
+from conformance.suite import Result, Run, reports
 from conformance.suite.session import outcomes_of
 from conformance.vectors import Vector
 from mushrooms.figures import style as plots

@@ -4,8 +4,6 @@ A page is one file: no scripts, and nothing is loaded from elsewhere. Claims are
 looks like a formula there becomes italic letters, sub- and superscripts and proper signs.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

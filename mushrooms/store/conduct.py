@@ -6,8 +6,6 @@ block followed it, nor how often it was tried. No decision rests on the time of 
 from a clock that only goes forwards.
 """
 
-from __future__ import annotations
-
 import logging
 import math
 import shutil

@@ -11,8 +11,6 @@ for each cycle, minimum of nu or wall stands in columns of its own, counted from
 cycle_energies_1, t_in_1_1, wall_counts_arc.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import warnings

@@ -4,8 +4,6 @@ A block of particles is one chunk of each array. Along the cycles a chunk holds 
 and a run that is lengthened gets further chunks. What is not there yet reads as nan, or as -1.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import platform

@@ -7,8 +7,6 @@ a request has the name of its class without the suffix. `python -m scene.protoco
 docs/protocol.schema.json` prints the schema.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Annotated, Any, get_args

@@ -5,8 +5,6 @@ answered by `rejected`, with a reason that names the field. A stepper that does 
 answers `AnsweredCollision` without them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from typing import Any, BinaryIO

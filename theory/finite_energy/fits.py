@@ -3,8 +3,6 @@
 What finite energy does is predicted by `one_cycle`; this works for any cycle, with frozen rates or without.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

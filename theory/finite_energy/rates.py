@@ -11,8 +11,6 @@ lags behind. Rates are joined with the adiabatic theory's energies and hazards. 
 have other speeds, so lags and sums are functions of their gain over the uncaptured too.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from functools import lru_cache

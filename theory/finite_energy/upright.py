@@ -8,8 +8,6 @@ where they lean outward some stay in another way. Neither is computed here. theo
 is, and says which steps are heuristic.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

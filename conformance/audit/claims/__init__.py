@@ -1,7 +1,5 @@
 """The claims of the paper, read from claims.toml, with the check of each: a file for each group of claims."""
 
-from __future__ import annotations
-
 import tomllib
 from functools import cache
 from importlib import resources

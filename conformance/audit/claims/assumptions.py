@@ -7,8 +7,6 @@ C3, C4, C10: what a cycle is to its particles, its shapes in their order. C5: sp
 the number of collisions, and E ~ t^2 where nothing is exponential.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import NamedTuple

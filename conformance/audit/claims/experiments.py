@@ -1,7 +1,5 @@
 """The paper's experiments, measured in our simulations and held against theory: X1 to X8, X4 apart."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -5,8 +5,6 @@ frozen tables (theory/equations.md, "Finite energy"). A band is how far that the
 (`theory_error`): nothing is measured on the samples that it judges.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from functools import cache

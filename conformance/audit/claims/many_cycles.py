@@ -3,8 +3,6 @@
 Sums of cycles are held against sums drawn from theory, and a Gaussian; cycles against their reverses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

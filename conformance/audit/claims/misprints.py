@@ -5,8 +5,6 @@ hold for every cycle by theory and are held against simulations; N claims are ch
 other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from decimal import ROUND_HALF_EVEN, Decimal
 from typing import Any

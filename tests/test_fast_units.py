@@ -132,12 +132,6 @@ def test_what_does_not_fit_is_refused(scene, state, words):
     assert "\n" not in found.reason
 
 
-def test_the_least_of_all_floats_beside_a_common_table():
-    found = fast.next_collision(Cap(r=1.0), State(0.0, 0.0, 0.5, 3.0, 5e-324), 9.0)
-    assert isinstance(found, Collision)
-    assert found.wall == "arc"
-
-
 MIXED = Mushroom(
     r=Fourier(1.5, cos=(0.3,), period=1.0),
     h=BangBang(((0.0, 2.0), (0.3, 1.0), (0.5, 1.0), (1.0, 2.0))),

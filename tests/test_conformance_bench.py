@@ -424,20 +424,13 @@ def test_without_a_compiler_the_reason_is_told(monkeypatch, tmp_path):
         baselines.build(tmp_path, [])
 
 
-needs_compiler = pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler is installed")
-
-
-@pytest.fixture(scope="module")
-def lean():
-    command = [sys.executable, "-m", "conformance.bench.baselines", "lean-c"]
-    with pytest.MonkeyPatch.context() as patch:  # ensembles and promises are not what is looked at
-        patch.setattr("conformance.suite.run.checks_of", lambda *_: [])
-        return suite.check(command, seed=1, groups=["moving-cap", "fast-wall"], limits=Limits(total=300.0))
-
-
 @pytest.mark.deep
-@needs_compiler
-def test_a_lean_stepper_without_checks_passes_the_easy_and_fails_the_hard(lean):
+@pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler is installed")
+def test_a_lean_stepper_without_checks_passes_the_easy_and_fails_the_hard(monkeypatch):
+    """Ensembles and promises are not what is looked at."""
+    monkeypatch.setattr("conformance.suite.run.checks_of", lambda *_: [])
+    command = [sys.executable, "-m", "conformance.bench.baselines", "lean-c"]
+    lean = suite.check(command, seed=1, groups=["moving-cap", "fast-wall"], limits=Limits(total=300.0))
     easy, hard = (lean.counts(group) for group in ("moving-cap", "fast-wall"))
     assert easy["pass"] > 0.9 * sum(easy.values())
     assert hard["fail"] >= 5

@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from support import faulty_references as faults
-from support.depth import deep_among, deep_but
+from support.depth import deep_but
 from support.refusals import assert_refused
 from support.schemas import validator
 from support.tables import LIFT
@@ -64,7 +64,6 @@ KILLS = [
     ("extreme-scale", faults.overflowing, 40),
     ("rest-and-sweep", faults.resting, 20),
     ("thin-ring", faults.narrow_mouth, 60),
-    ("slow-towards-waves", faults.swept_begins_alone, 10),
     ("nearly-shut", faults.rough_terms, 40),
     ("all-but-gone", faults.rough_terms, 40),
     ("anywhere", faults.period_from_zero, 10),
@@ -74,7 +73,6 @@ KILLS = [
     ("anywhere", faults.reduced_time, 20),
     ("slow-towards-waves", faults.impatient, 10),
 ]
-SLOW = [kill for kill in KILLS if kill[1] is faults.swept_begins_alone]  # test_reference_mutants, too
 USUAL = sorted({"growing-stem", "steep", *(name for name, _, _ in KILLS)})
 
 
@@ -91,7 +89,7 @@ def test_our_steppers_survive(name, tally):
     assert all(len(cases) == found.counts[kind] for kind, cases in found.cases.items())
 
 
-@pytest.mark.parametrize("kill", deep_among(KILLS, *SLOW))
+@pytest.mark.parametrize("kill", KILLS)
 def test_a_family_finds_its_fault(kill, monkeypatch):
     name, fault, n_cases = kill
     fault(monkeypatch)

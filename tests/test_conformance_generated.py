@@ -56,6 +56,7 @@ FAULTS: dict[str, tuple[Mutant, str]] = {
     "2 nu' r' forgotten": (MUTANTS["curvature-of-side-without-product"], "bend-nu-rate-bang-bang"),
     "amplitudes added up": (MUTANTS["sizes-judged-by-their-amplitudes"], "deep-waves"),
     "150 periods at most": (MUTANTS["gives-up-after-ten-periods"].of_size(150), "vibrating-stem"),
+    "64 sub-steps of a flight": (MUTANTS["sub-steps-tested-at-their-ends"].of_size(64), "brief-cap-arc"),
 }
 
 
@@ -165,19 +166,6 @@ def late_phase_in_float32(flight, plain, law):
     """Keeps the time of departure in binary32 from a hundred thousand on."""
     t = flight.state.t
     return flight.kinds[type(law)](law, single(t) if abs(t) > 1e5 else t)
-
-
-@fault("looks by the period", "brief-cap-arc", "first_root", TieBlind)
-def looks_by_the_period(flight, plain, wall, start, end):
-    """Looks at f 64 times in a period for a change of sign, and in a flight."""
-    look = min((flight.scene.period or 1.0) / 64, (end - start) / 64)
-    a = start
-    while a < end:
-        b = min(a + look, end)
-        if flight.f(wall, b)[0] <= 0:
-            return flight.root_between(wall, a, b)
-        a = b if b > a else end
-    return None
 
 
 @fault("captured cannot leave", "changed-mouth-right", "is_mouth_open")

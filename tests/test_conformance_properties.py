@@ -132,12 +132,6 @@ def separate_path_for_moving_walls(scene, state, t_end):
     )
 
 
-def shy_of_reversed_time(scene, state, t_end):
-    """Kicks by 2 u, unless time is negative."""
-    step = COMMON["wall-velocity-once"].step if state.t < 0 else plain.next_collision
-    return step(scene, state, t_end)
-
-
 FAULTY = [
     ("mirror", MUTANTS["left-side-upright"].step, SLANTED),
     (
@@ -154,7 +148,6 @@ FAULTY = [
     ("split-flight", COMMON["arc-static"].step, GALLERY),
     ("split-flight", COMMON["wall-velocity-at-departure"].step, BREATHING),
     ("reversal", COMMON["arc-static"].step, GALLERY),
-    ("reversal", shy_of_reversed_time, LIFT),
     ("angular-momentum", COMMON["normal-at-departure"].step, GALLERY),
     ("energy", MUTANTS["normal-without-cos"].step, SLANTED),
     ("symplectic", COMMON["wall-velocity-once"].step, LIFT),

@@ -22,7 +22,7 @@ from conformance import vectors
 from conformance.mutants.kill_matrix import diagnose
 from conformance.suite import reports
 from conformance.suite import run as suite
-from conformance.suite.process import CheckFailure, CommandNotFound
+from conformance.suite.process import CheckFailure
 from conformance.suite.result import VERDICTS, Result, Run
 from conformance.suite.run import Transform
 from conformance.suite.session import Limits, Session, missing, read_answer
@@ -197,11 +197,6 @@ def test_the_total_time_ends_a_check_that_every_answer_keeps_alive(verdicts):
     assert asked["made-up/2"].verdict == asked["protocol/stop"].verdict == "timed-out"
     assert asked["protocol/stop"].why == "not asked: the total time of 2 s is spent"
     assert run.seconds < 5.0
-
-
-def test_a_command_that_does_not_exist():
-    with pytest.raises(CommandNotFound, match="no-such-stepper"), Session(["./no-such-stepper"]) as session:
-        session.start()
 
 
 # Beside what an answer of each command holds, an error is the answer.

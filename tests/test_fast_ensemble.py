@@ -4,8 +4,6 @@ Capture intervals stand in the slots of the minima of nu that they span. They ar
 definition, in plain Python, along trajectories.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

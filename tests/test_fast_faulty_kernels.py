@@ -1,7 +1,5 @@
 """Kernels with one line changed: a comparison of another test module finds each."""
 
-from __future__ import annotations
-
 import pytest
 from support.depth import deep_but
 from support.faulty_kernels import value_of
@@ -38,7 +36,7 @@ FAULTS = {
     ),
     "the time of a hop is known to its own last bit only": (
         "test_fast_recollisions",
-        "wrong_recollisions(60) != []",
+        "wrong_answers(again(60)) != []",
         "scalar_step.py",
         "s_low, rest = rest_of_hop(s, f, slope_s, particle, scene, anchors), 0.0",
         "s_low, rest = 0.0, 0.0",

@@ -1,7 +1,5 @@
 """`fast.flow`, given particles to a given time, and `fast.follow`, to a capture, a release or an energy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpmath import fp

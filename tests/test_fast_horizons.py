@@ -5,9 +5,6 @@ at which it is asked for: a crossing, a horizon, the order of two hits. Numbers 
 is open at that size; the reference, for which times are exact, has it.
 """
 
-from __future__ import annotations
-
-import math
 from fractions import Fraction
 
 import numpy as np
@@ -136,16 +133,6 @@ def after_a_spike(random: np.random.Generator) -> Question:
     return Cap(r=law), State(t, 0.0, y, 0.0, 0.0), float(t_end)
 
 
-def after_a_long_wait(random: np.random.Generator) -> Question:
-    """Ask for a horizon soon after the first touch of a wall that has gone to and fro a million times."""
-    law = BangBang(((0.0, 1.5), (1.0, 0.5), (2.0, 1.5)))
-    speed, n = 2.0 ** random.uniform(-40, -30), 2 * int(2.0 ** random.uniform(18, 26)) + 1
-    y = 0.5 - speed * (n - random.uniform(0.0, 2.0))
-    # Two walls' widths of time after the wall is least: it has come back by then.
-    since = 3.0 * math.sqrt(speed)
-    return Cap(r=law), State(0.0, 0.0, float(y), 0.0, float(speed)), n + since
-
-
 def beside_a_moving_mouth(random: np.random.Generator) -> Question:
     """Cross y = 0 within 2^-40 of the edge of a mouth that moves, after one to thirty thousand periods."""
     period = float(random.choice([1.0, 0.3, 2.0**-6]))
@@ -186,7 +173,6 @@ def along_a_leaning_side(random: np.random.Generator) -> Question:
 # How to draw a question, and how many: the reference takes long for some.
 FAMILIES = {
     "after a spike": (after_a_spike, 12),
-    "after a long wait": (after_a_long_wait, 5),
     "beside a moving mouth": (beside_a_moving_mouth, 40),
     "along a leaning side": (along_a_leaning_side, 300),
 }

@@ -3,8 +3,6 @@
 `MUSHROOMS_SCALINGS=20000 pytest tests/test_fast_units.py` searches deeper.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from importlib import import_module
@@ -132,12 +130,6 @@ def test_what_does_not_fit_is_refused(scene, state, words):
     assert isinstance(found, Rejected)
     assert words in found.reason
     assert "\n" not in found.reason
-
-
-def test_the_least_of_all_floats_beside_a_common_table():
-    found = fast.next_collision(Cap(r=1.0), State(0.0, 0.0, 0.5, 3.0, 5e-324), 9.0)
-    assert isinstance(found, Collision)
-    assert found.wall == "arc"
 
 
 MIXED = Mushroom(

@@ -1,7 +1,5 @@
 """The command line: results as promised, how a command ends, the manners of all commands, odd scenes."""
 
-from __future__ import annotations
-
 import errno
 import io
 import json
@@ -208,19 +206,26 @@ def test_whole_numbers_may_have_exponents(command_line, given):
     assert command_line(*run).data()["particles"] == 20
 
 
-def test_wherever_it_prints_nothing_is_lost_for_want_of_a_letter_or_a_width(monkeypatch):
-    rng = np.random.default_rng(20261123)
-    sizes = ["", "0", "-1", "60", "200", "\N{SUPERSCRIPT TWO}", "9" * 5000, "1e2", "wide"]
-    for _ in range(60):
-        for name in ("COLUMNS", "LINES"):
-            monkeypatch.setenv(name, sizes[rng.integers(len(sizes))])
-        encoding = ["ascii", "latin-1", "cp1252", "utf-8"][rng.integers(4)]
-        kept = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
-        monkeypatch.setattr(sys, "stdout", kept)
-        with pytest.raises(SystemExit) as stop:
-            run([["scenes"], ["scenes", "--json"], ["scenes", "moving-cap"]][rng.integers(3)])
-        assert stop.value.code == 0
-        assert len(kept.buffer.getvalue()) > 200
+SIZES = ("", "0", "-1", "60", "200", "\N{SUPERSCRIPT TWO}", "9" * 5000, "1e2", "wide")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])
+@pytest.mark.parametrize("size", SIZES, ids=range(len(SIZES)))
+@pytest.mark.parametrize("words", [["scenes"], ["scenes", "--json"], ["scenes", "moving-cap"]])
+def test_wherever_it_prints_nothing_is_lost_for_want_of_a_letter_or_a_width(
+    monkeypatch, encoding, size, words
+):
+    for name in ("COLUMNS", "LINES"):
+        monkeypatch.setenv(name, size)
+    kept = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    monkeypatch.setattr(sys, "stdout", kept)
+    with pytest.raises(SystemExit) as stop:
+        run(words)
+    assert stop.value.code == 0
+    assert len(kept.buffer.getvalue()) > 200
+
+
+def test_the_width_of_a_terminal_may_be_given(monkeypatch):
     monkeypatch.setenv("COLUMNS", "60")
     assert new_console().width == 60
 

@@ -169,12 +169,9 @@ def test_phases_lose_no_digit(t, number, is_period):
     assert ctx.mpf(sin.a) - rounding <= truth <= ctx.mpf(sin.b) + rounding
 
 
-def test_an_undecided_sign_is_zero():
-    arithmetic = Arithmetic(10)
-    assert sign(arithmetic.context.mpf([-1, 1])) == 0
-    assert sign(arithmetic.context.mpf([0, 1])) == 0
-    assert sign(arithmetic.context.mpf([1, 2])) == 1
-    assert sign(arithmetic.context.mpf([-2, -1])) == -1
+@pytest.mark.parametrize(("ends", "expected"), [((-1, 1), 0), ((0, 1), 0), ((1, 2), 1), ((-2, -1), -1)])
+def test_an_undecided_sign_is_zero(ends, expected):
+    assert sign(Arithmetic(10).context.mpf(ends)) == expected
 
 
 @given(numbers, st.floats(0, 1e-3))

@@ -13,7 +13,7 @@ import reference
 from conformance import plain
 from conformance.cases.draw import Draw
 from fast.batch import careful_steps
-from scene import BadInput, BangBang, Cap, Collision, Horizon, Mushroom, Rejected, State, Stem, load
+from scene import BadInput, Cap, Collision, Horizon, Mushroom, Rejected, State, Stem, load
 
 CAP, MUSHROOM = Cap(r=1.0), Mushroom(r=1.0, h=1.0, w=0.5)
 GOOD = {"t": 0.0, "x": 0.1, "y": 0.3, "vx": 1.0, "vy": 0.7}
@@ -153,7 +153,6 @@ def test_numbers_of_other_kinds_are_the_floats_they_stand_for(kind):
 
 
 RESTING = State(0.0, 0.0, 0.5, 0.0, 0.0)
-SWEPT_ONCE = Cap(r=BangBang(knots=((0.0, 1.0), (1.0, 0.5), (2.0, 1.0))))
 
 
 def test_what_rests_and_is_never_swept_stays_where_it_is():
@@ -167,12 +166,6 @@ def test_what_rests_and_is_never_swept_stays_where_it_is():
     assert found == [Horizon(math.inf, 0.0, 0.5, 0.0, 0.0)] * 4
     assert fast.trajectory(CAP, RESTING, 3, 7.0).outcome == Horizon(7.0, 0.0, 0.5, 0.0, 0.0)
     assert fast.trajectory(CAP, RESTING, 0).outcome is None
-
-
-def test_what_rests_in_a_wall_s_way_is_swept():
-    path = fast.trajectory(SWEPT_ONCE, State(0.0, 0.0, 0.75, 0.0, 0.0), 1)
-    assert path.walls == ["arc"]
-    assert np.isfinite(path.steps).all()
 
 
 def test_catalogue_names_are_answered_with_a_hint():

@@ -6,8 +6,6 @@ uncaptured peak has a width ~ E0^(-1/4) and drifts by a quarter of its variance.
 nu at capture by O(1/v). Cycles are independent.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import pairwise
 

@@ -82,6 +82,9 @@ ANSWERS = {
     "along the base": by_hand(STATIC, State(0.0, 0.75, 0.0, 1.0, 0.0, "base"), "sliding"),
     "along the base, unnamed": by_hand(STATIC, State(0.0, 0.75, 0.0, 1.0, 0.0), "sliding"),
     "along a side": by_hand(BOX, State(0.0, 1.0, -0.5, 0.0, 1.0, "right"), "sliding"),
+    # f' = f'' = 0 is a tangency, and sliding only along a base or where nothing moves.
+    "at rest beside a side at rest": by_hand(BOX, State(0.0, 1.0, -0.5, 0.0, 0.0, "right"), "sliding", 0.1),
+    "the same where others move": by_hand(LIFT, State(0.0, 1.0, -1.0, 0.0, 0.0, "right"), "tangency", 0.1),
     "pushed by the floor": by_hand(LIFT, State(0.0, 0.0, -2.0, 0.0, 0.0, "floor"), "sliding"),
     "on two walls": by_hand(STATIC, State(0.0, 1.0, 0.0, -0.1, -1.0, "arc"), "corner"),
     "on arc and base": by_hand(CIRCLE, State(0.0, 1.0, 0.0, -1.0, 0.1, "arc"), "corner"),
@@ -105,6 +108,8 @@ ANSWERS = {
     "at the edge, level": by_hand(STATIC, State(0.0, -0.5, 0.0, 1.0, 0.0, "left"), "mouth-edge"),
     "at the edge, downwards": by_hand(STATIC, State(0.0, 0.5, 0.0, -1.0, -0.3, "right"), "mouth-edge"),
 }
-UNDEFINED = {name: row for name, row in ANSWERS.items() if row[3] in ("corner", "mouth-edge", "sliding")}
-# Beside the base, binary64 can tell: y = 0 exactly.
-ON_TWO_WALLS = {name: row for name, row in UNDEFINED.items() if name[:3] in ("on ", "at ") and row[1].y == 0}
+REASONS = ("corner", "mouth-edge", "sliding", "tangency")
+UNDEFINED = {name: row for name, row in ANSWERS.items() if row[3] in REASONS}
+# Beside the base, and where nothing moves, binary64 can tell: y = 0 exactly.
+SURE = {name for name, row in UNDEFINED.items() if name[:3] in ("on ", "at ") and row[1].y == 0}
+SURE.add("at rest beside a side at rest")

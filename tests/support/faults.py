@@ -72,7 +72,6 @@ from support.faulty_steppers import (
     leaving_out,
     losing_stays,
     mend,
-    never_moving,
     on,
     once,
     one_bad_spoils_all,
@@ -84,7 +83,6 @@ from support.faulty_steppers import (
     repeated,
     room_for,
     same_time_for_all,
-    same_velocity_for_all,
     slowed,
     straight_on,
     swapping,
@@ -198,7 +196,6 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
         "wrong-format",
         on(FLOW, each("rejected", lambda _, part, __: part.update(captured=[0.0, 1.0]))),
     ),
-    "first-for-all": ("many-particles", "fail", on(FLOW, same_velocity_for_all)),
     "first-time-for-all": ("many-particles", "fail", asked(same_time_for_all, FLOW)),
     **{f"room-for-{n}": ("many-particles", "fail", on(FLOW, room_for, n=n)) for n in (64, 256, 500, 2000)},
     "particles-without-time": (
@@ -271,7 +268,6 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     "spiralling": ("long-paths", "fail", on(PATH, each("collision", leaking, angle=1e-10))),
     "leaking-before-it-is-open": ("long-paths", "fail", on(PATH, mend)),
     "horizon-at-once": ("long-paths", "fail", on(PATH, horizon_at_once)),
-    "never-moving": ("long-paths", "fail", on(PATH, each("collision", never_moving))),
     "standing-at-a-wall": ("long-paths", "fail", on(PATH, repeated)),
     "pressing-at-a-wall": ("long-paths", "fail", on(PATH, repeated, factor=-1.0)),
     "at-twice-the-time": (

@@ -1,7 +1,5 @@
 """The fast stepper with one line of its kernels changed, in a process or a module of its own."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -212,11 +212,6 @@ def repeated(_: Line, found: Line, *, factor: float = 1.0) -> Line:
     return {**found, "steps": [first] * len(found["steps"])}
 
 
-def never_moving(request: Line, step: Line, _: int) -> None:
-    """Be at every hit where the particle began."""
-    step |= {name: request["state"][name] for name in NUMBERS[1:]}
-
-
 def horizon_at_once(request: Line, found: Line) -> None:
     """Say that nothing is ever met, where the particle begins."""
     start = {name: request["state"][name] for name in NUMBERS}
@@ -254,13 +249,6 @@ def one_bad_spoils_all(_: Line, found: Line) -> Line:
     """Reject all states of a flow where one is bad."""
     bad = [state for state in found["states"] if state["outcome"] == "rejected"][:1]
     return {**found, "states": bad * len(found["states"]) or found["states"]}
-
-
-def same_velocity_for_all(_: Line, found: Line) -> None:
-    """Give every particle the velocity of the first that arrives."""
-    there = [state for state in found["states"] if state["outcome"] == "horizon"]
-    for state in there:
-        state["vx"] = there[0]["vx"]
 
 
 def same_time_for_all(request: Line) -> None:

@@ -6,8 +6,6 @@ wall is met and the time are drawn, the velocity follows. The lanes' time of fli
 much: what holds before may not hold after it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from mpmath import fp
 
@@ -15,7 +13,7 @@ from fast.kernel import records
 from fast.kernel.records import FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
 from scene.laws import value
-from support.lane_anywhere import Draw, Start
+from support.lane_anywhere import Start
 
 
 def at_a_resting_edge(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
@@ -88,7 +86,7 @@ def at_the_edge_of_the_mouth(n: int, random: np.random.Generator) -> tuple[Scene
     return Mushroom(r=1.0, w=w, h=1.0, slope=lean), starts
 
 
-CORNERS: dict[str, Draw] = {
+CORNERS = {
     "a resting mouth's edge": at_a_resting_edge,
     "the end of a resting arc": at_the_end_of_a_resting_arc,
     "a resting floor's corner": at_a_resting_floor,

@@ -6,8 +6,6 @@ some f falls below zero and rises above it again within the time that lanes look
 answer hangs on a check. Some starts are kept unseen, so that the lanes have something to answer.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

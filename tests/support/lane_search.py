@@ -1,12 +1,10 @@
 """A search for wrong lane answers, aimed at what the checks of docs/lanes.md rule out.
 
-Draws of `lane_anywhere` are of every kind; the other groups aim at one kind of flight each. Each start goes
-three lane steps, so that what a step leaves to the next is tried too. An answer is wrong that names another
-wall than the careful step from the same state, or differs from it by more than 4 backward ulps; or another
-than the floor, from a start above it by less than the careful step tells, but rising slower.
+Draws of `lane_anywhere` are those of the suite; the other groups aim at one kind of flight each. Each start
+goes three lane steps, so that what a step leaves to the next is tried too. An answer is wrong that names
+another wall than the careful step from the same state, or differs from it by more than 4 backward ulps; or
+another than the floor, from a start above it by less than the careful step tells, but rising slower.
 """
-
-from __future__ import annotations
 
 from collections import Counter
 from functools import partial
@@ -26,9 +24,8 @@ from support.lane_traps import TRAPS
 BOUND = 4.0  # backward ulps
 CLOSE = 2.0**-24  # relative, where no more can be asked: see error_of
 NUDGES = (2.0**-36, 2.0**-46)  # of each number of a state: for the derivatives of a step
-ANYWHERE = "anywhere"
 AIMED = {name: Group(partial(draw_aimed, aim), aim.is_captured) for name, aim in AIMS.items()}
-GROUPS: dict[str, Group] = {ANYWHERE: Group(draw_anywhere), **AIMED, **TRAPS}
+GROUPS: dict[str, Group] = {"anywhere": Group(draw_anywhere), **AIMED, **TRAPS}
 N_ROUNDS = 3
 ANSWERS_OF_A_DRAW = 10
 Wrong = tuple[Scene, list[float], int, int, list[float]]  # start, its wall, the lane's wall, its numbers
@@ -162,9 +159,7 @@ class Round(LaneRound):
         return total
 
 
-def search(
-    seed: int, n: int, tally: Counter[str], name: str = ANYWHERE, kernels: ModuleType = lanes
-) -> list[Wrong]:
+def search(seed: int, n: int, tally: Counter[str], name: str, kernels: ModuleType = lanes) -> list[Wrong]:
     """Search one group of draws until lanes have given n answers; returns the wrong ones.
 
     The search of faulty kernels ends with the first draw in which they are found out. Starts that are solved

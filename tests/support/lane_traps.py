@@ -1,9 +1,8 @@
 """Starts that are solved for, for the search in lane_search: random ones hardly ever hang on these checks.
 
 `misled chord` and `misled side` solve for a flight whose f has two or three roots close together, and for
-which Newton's method from the lane's guess lands on the second or third of them. `corner over a rising floor`
-starts on a side so near the floor that its f is computed as 0. The other answers hang on a rounding that as a
-rule goes unnoticed:
+which Newton's method from the lane's guess lands on the second or third of them. The other answers hang on a
+rounding that as a rule goes unnoticed:
 
 How long a hop is depends on the arc's rate less the particle's, and an error of the one is an error of the
 other. As a rule rounding of the state or the time does as much. It does not where those are small: early,
@@ -16,8 +15,6 @@ wall does not help. The same holds for a slope that moves and is nearly zero.
 A flight up a deep stem may be a million times as long as the cap is high: what is left of its time moves the
 place of the hit along the path, and no rounding of the start does, which moves it across.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable
 from math import comb
@@ -33,23 +30,6 @@ from support.lane_anywhere import Group, Start
 
 N_CROWD = 4_000
 REACH = 0.24  # phase
-
-
-def corner_over_a_rising_floor(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
-    """Draw starts on the left side that the floor, slowing down, overtakes at once but for rounding.
-
-    Without its f at the start, only f at y = 0 and the bound on its curvature tell that it is met.
-    """
-    least, least_after = float(10.0 ** random.uniform(-4, -2)), float(random.uniform(0.1, 0.3))
-    depth = Fourier(1.0 + least, 1.0, (-1.0,))
-    scene = Mushroom(r=float(1.0 + 10.0 ** random.uniform(-3, -1)), w=1.0, h=depth)
-    starts = []
-    for t in random.uniform(-0.1, 0.0, n) - least_after:
-        h, rate = float(value(fp, depth, float(t))), float(value(fp, depth, float(t), 1))
-        rise = -rate * random.uniform(0.7, 1.0)
-        along = random.uniform(1.3, 1.9) * rise / h  # to cross the mouth at a third to 0.9 of its half-width
-        starts.append((np.array([t, 0.0, -1.0, -h, along, rise]), int(records.LEFT)))
-    return scene, starts
 
 
 def zero_between(off: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:
@@ -246,7 +226,6 @@ def across_a_slope_near_zero(n: int, random: np.random.Generator) -> tuple[Scene
 
 
 TRAPS: dict[str, Group] = {
-    "corner over a rising floor": Group(corner_over_a_rising_floor),
     "misled chord": Group(misled_chord, is_captured=True),
     "misled side": Group(misled_side),
     "early hop": Group(early_hop),

@@ -5,8 +5,6 @@ is right as it stands, and has a switch for each of its mistakes. The rest of `E
 whoever writes the numbers down.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import pi
 from typing import Any
@@ -157,24 +155,19 @@ def without_the_captured(columns: dict[str, Any]) -> dict[str, Any]:
     return {name: column[free] for name, column in columns.items()}
 
 
-def in_place_of_logarithms(columns: dict[str, Any]) -> dict[str, Any]:
-    """Give E1/E0 for its logarithm."""
-    return {"s": columns["E1"] / columns["E0"]}
-
-
-# By name: the switches of the engine, and what is done with its columns.
 def written_as(change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], dict[str, Any]]:
     """Return what writes down log E1/E0, changed, and nothing else."""
     return lambda columns: {"s": change(np.log(columns["E1"] / columns["E0"]))}
 
 
+# By name: the switches of the engine, and what is done with its columns.
 ENSEMBLES: dict[str, tuple[dict[str, Any], Callable[[dict[str, Any]], dict[str, Any]]]] = {
     "right": ({}, dict),
     "leaks at the mouth's corners": ({"leak": 0.006}, dict),
     "energies in single precision": ({}, in_single_precision),
     "wrong sign of the wall's speed": ({"has_wrong_sign": True}, dict),
     "captured particles dropped": ({}, without_the_captured),
-    "E in place of log E": ({}, in_place_of_logarithms),
+    "E in place of log E": ({}, written_as(np.exp)),
     "starts on the wall": ({"on_the_wall": True}, dict),
     "misprinted protocol": ({"misprinted": True}, dict),
     "half a period": ({"t_end": PERIOD / 2}, dict),

@@ -32,6 +32,8 @@ from conformance.cases.certify import (
 )
 from conformance.cases.draw import Question, Unfit
 from conformance.cases.table import FAMILIES
+from conformance.grading.agreement import compare
+from conformance.plain import step as plain
 from conformance.vectors import (
     MANIFEST,
     NUMBERS,
@@ -224,6 +226,25 @@ def test_allowances_bound_what_a_nudge_does():
         for name, allowed, number in zip(NUMBERS, step.allowance, got, strict=True):
             difference = abs(float(Fraction(getattr(step, name)[0]) - Fraction(number)))
             assert difference <= 1.01 * e * allowed + 2.0**-52 * abs(number)
+
+
+def rounding_step(scene, state, t_end):
+    """Step exactly, and round what comes out: no stepper in binary64 does better."""
+    outcome = reference.next_collision(scene, state, t_end, digits=25)
+    return outcome.rounded() if isinstance(outcome, reference.Collision) else outcome
+
+
+@pytest.mark.parametrize(
+    "index", [83, 199, 203], ids=["late", "wall across the table", "start beyond the wall"]
+)
+def test_a_path_ends_before_rounding_leads_elsewhere(index):
+    """A wall crosses the table between two neighbours in binary64: no derivative says so."""
+    vector = certify(FAMILIES["knot-at-event"].question(f"k/{index}"), 1)
+    (known,) = vector.expect
+    path = plain.trajectory(
+        from_data(vector.scene), vector.state, len(known.steps), vector.t_end, rounding_step
+    )
+    assert compare(path, known, vector.state, 4.0).verdict == "pass"
 
 
 @pytest.mark.parametrize(

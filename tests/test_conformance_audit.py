@@ -3,6 +3,8 @@
 The table of frozen rates can be measured anew, entry by entry, and a wrong one is found out.
 """
 
+import math
+
 import mpmath
 import numpy as np
 import pytest
@@ -33,7 +35,7 @@ from conformance.audit.session import AuditSettings, conduct
 from conformance.audit.tolerances import MAX_TESTS, N_SIGMA, close, fits, power
 from scene import BangBang, Mushroom, load
 from scene.geometry import table_at
-from theory.finite_energy.rates import PHASES, Rates, frozen_rates
+from theory.finite_energy.rates import MEMORIES, PHASES, Rates, frozen_rates
 
 # They follow single particles, slow ones, flows, other tables or upright ones: not the stand-in's matter.
 REAL = ("L1", "L7", "C2", "C6", "C11", "C12", "C13")
@@ -378,6 +380,34 @@ def test_a_wrong_table_is_found_out(field: str) -> None:
 def test_the_table_holds_what_the_command_measures() -> None:
     for name in MEASURED:
         assert not frozen_rates(SCENES.get(name) or load(name))[1]
+
+
+def kicks_of(memories: tuple[float, ...], n: int, seed: int) -> np.ndarray:
+    """Return sums of kicks over steps of STEP, of variance 1 per length for each memory; (n, steps)."""
+    random, fine = np.random.default_rng(seed), frozen.STEP / 4
+    n_steps = round(frozen.PATH / fine)
+    total = np.zeros((n, n_steps))
+    for m in memories:
+        decay = math.exp(-fine / m)
+        x = random.standard_normal(n)
+        for k in range(n_steps):
+            total[:, k] += x * fine * (2 * m) ** -0.5
+            x = decay * x + math.sqrt(1 - decay**2) * random.standard_normal(n)
+    return total.reshape(n, -1, 4).sum(axis=2)
+
+
+@pytest.mark.parametrize("memories", [(12.0,), (36.0, 108.0), (20.0,)])
+def test_kicks_are_found_with_their_memories(memories: tuple[float, ...]) -> None:
+    """A sum over a finite path would miss what its ends remember; the correlations do not."""
+    kicks = kicks_of(memories, 2000, 1)
+    n_steps = kicks.shape[1]
+    turn = 2 * math.pi * np.arange(n_steps + 1) / n_steps
+    speed = np.diff(np.sin(turn)) / (turn[1] - turn[0])
+    found = frozen._spectrum(kicks * speed, speed)
+    assert found.sum() == pytest.approx(len(memories), rel=0.05)
+    mean = found @ np.array(MEMORIES) / found.sum()
+    assert mean == pytest.approx(np.mean(memories), rel=0.2)
+    assert abs(frozen._spectrum(kicks * speed, np.ones_like(speed)).sum() / len(memories) - 1) > 0.3
 
 
 def test_a_mouth_that_comes_to_rest_wide_open_has_fewer_passages_and_they_end() -> None:

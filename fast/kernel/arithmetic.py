@@ -34,10 +34,10 @@ TWO_OVER_PI = 0.6366197723675814
 
 def split(number: Fraction, n: int = 2) -> list[float]:
     """Split a number into n floats, each the nearest to what is left."""
-    found = []
-    for _ in range(n):
-        found.append(float(number))
+    found = [float(number)]
+    while len(found) < n:
         number -= Fraction(found[-1])
+        found.append(float(number))
     return found
 
 

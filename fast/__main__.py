@@ -20,8 +20,10 @@ FOR_EVER = 2.0**1000  # the horizon of a path that has none, once nothing is met
 def follow(scene: Scene, state: State, n_collisions: int, t_end: float = math.inf) -> list[Outcome]:
     """Return the collisions of a trajectory, the last entry may be another outcome."""
     path = fast.trajectory(scene, state, n_collisions, t_end)
-    steps = [Collision(wall, *row) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)]
-    return [*steps, path.outcome] if path.outcome is not None else list(steps)
+    steps: list[Outcome] = [
+        Collision(wall, *row) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)
+    ]
+    return steps if path.outcome is None else [*steps, path.outcome]
 
 
 def carry(

@@ -99,8 +99,8 @@ def begun(request):
 
     def interrupt() -> None:
         event.wait()
-        whom = main if request.param == "to this thread" else threading.get_ident()
-        signal.pthread_kill(whom, signal.SIGINT)
+        target = main if request.param == "to this thread" else threading.get_ident()
+        signal.pthread_kill(target, signal.SIGINT)
 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     thread = threading.Thread(target=interrupt)

@@ -213,7 +213,7 @@ def test_a_mouth_that_stands_still_captures_nobody():
 
 @pytest.mark.parametrize("energy", [1.0, 10.0])
 def test_who_is_released_takes_part_though_the_stem_was_not_met(energy):
-    """At its widest this mouth is the whole base: whoever is captured in the cycle is let out by its end."""
+    """At its widest this mouth is the whole base: a particle captured in the cycle is let out by its end."""
     run = fast.simulate(load("moving-cap"), n_particles=2000, energy=energy, seed=1)
     never_below = np.isfinite(run.t_in).all(axis=(1, 2)) & ~run.wall_counts[:, 2:].any(axis=1)
     assert never_below.sum() > 5

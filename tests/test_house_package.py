@@ -1,4 +1,4 @@
-"""Who may import whom (import-linter holds it), and what is published: types, version, links, archive."""
+"""Which package imports which (import-linter holds it), and what is published: types, version, links."""
 
 import hashlib
 import os

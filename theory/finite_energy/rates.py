@@ -297,7 +297,7 @@ def _clock_start(scene: Mushroom) -> float:
     start += length * float(np.floor((opening - start) / length + ROUNDING))
     last = max((float(branch.ends[2].max()) for branch in tree(scene).all_branches()), default=start)
     if last > start + length * (1 + ROUNDING):
-        raise NotCovered("the cycle must begin with its mouth at the widest: who is captured then is unknown")
+        raise NotCovered("the cycle must begin with its mouth at the widest: captures before it are unknown")
     return start
 
 

@@ -20,9 +20,7 @@ FOR_EVER = 2.0**1000  # the horizon of a path that has none, once nothing is met
 def follow(scene: Scene, state: State, n_collisions: int, t_end: float = math.inf) -> list[Outcome]:
     """Return the collisions of a trajectory, the last entry may be another outcome."""
     path = fast.trajectory(scene, state, n_collisions, t_end)
-    steps: list[Outcome] = [
-        Collision(wall, *row) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)
-    ]
+    steps: list[Outcome] = list(map(Collision, path.walls, *path.steps.T.tolist()))
     return steps if path.outcome is None else [*steps, path.outcome]
 
 

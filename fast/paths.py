@@ -22,7 +22,7 @@ from mpmath import fp
 from fast.ensemble import follow_many, least_collisions, only_stop
 from fast.kernel import records
 from fast.kernel.fine_step import FineState, fine_path
-from fast.kernel.follow import PATHS
+from fast.kernel.follow import PATHS, follow_particles
 from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, unfilled_ends
 from fast.kernel.single import ANSWER_LOST
 from fast.kernel.worker import Loops, careful_at, follow_path, new_worker
@@ -306,6 +306,9 @@ def captured(scene: Scene, states: FloatArray, walls: Sequence[str]) -> npt.NDAr
     return found
 
 
+FEW = 1_000  # collisions: these take less time than to start a thread, and no interrupt waits long for them
+
+
 class Flow(NamedTuple):
     """N particles at t_end.
 
@@ -356,7 +359,7 @@ def carry(
     """Carry particles to t_end, those whose units agree together; those refused stay where they are.
 
     Returns:
-        What became of them, and the seconds that took.
+        What became of them, and the seconds that the threads took, if any were started.
 
     Raises:
         BadInput: the scene does not fit into binary64: see fast.units.
@@ -368,7 +371,12 @@ def carry(
         rows, walls = as_arrays([starts[i][0] for i in those])
         done = unfilled_ends(rows)
         stop = only_stop(units.horizon(t_end))
-        seconds += follow_many(laws_in_lanes(fit(scene).scene), done, walls, stop, threads)
+        fastest, longest = np.hypot(rows[:, 4], rows[:, 5]).max(), stop.times[0] - rows[:, 0].min()
+        in_lanes = laws_in_lanes(fit(scene).scene)
+        if len(rows) * least_collisions(fit(scene).scene, fastest, longest) < FEW:
+            follow_particles(new_worker(in_lanes, stop, done), walls)
+        else:
+            seconds += follow_many(in_lanes, done, walls, stop, threads)
         # t, its low part, x, y, vx, vy; begin and end of the capture interval
         numbers = np.column_stack([done.states, done.t_in[:, 0, 0], done.t_out[:, 0, 0]])
         numbers, is_kept = scaled(numbers, np.append(units.of_step(), [units.time, units.time]))

@@ -14,6 +14,7 @@ the numbers that the kernels read.
 
 import math
 import sys
+from copy import copy
 from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
@@ -220,7 +221,9 @@ def fit(scene: Scene) -> Fitted:
         name: _in_units(f"scene.{name}", law, 0 if name in ("nu", "slope") else length, time or 0)
         for name, law in laws(scene).items()
     }
-    fitted = msgspec.structs.replace(scene, **changed)
+    fitted = copy(scene)  # which is valid, and so is the same table in other units: one proof serves both
+    for name, law in changed.items():
+        msgspec.structs.force_setattr(fitted, name, law)
     compiled = compile_scene(fitted)
     return Fitted(fitted, length, time, compiled, pack_scene(compiled, length, time))
 

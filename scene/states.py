@@ -15,7 +15,7 @@ class InvalidState(BadInput):
     """A state that is invalid in its scene: one line naming field, value and bound."""
 
 
-class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class State(msgspec.Struct, frozen=True, gc=False, forbid_unknown_fields=True):
     """A particle in flight.
 
     `wall` names the wall that the particle is leaving, or is None. The particle is on that wall by
@@ -30,7 +30,7 @@ class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     wall: Wall | None = None
 
 
-class Collision(msgspec.Struct, frozen=True, tag_field="outcome", tag="collision"):
+class Collision(msgspec.Struct, frozen=True, gc=False, tag_field="outcome", tag="collision"):
     """The first wall met, the flight time dt, and the state just after the bounce."""
 
     wall: Wall
@@ -46,7 +46,7 @@ class Collision(msgspec.Struct, frozen=True, tag_field="outcome", tag="collision
         return State(self.t, self.x, self.y, self.vx, self.vy, self.wall)
 
 
-class Horizon(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
+class Horizon(msgspec.Struct, frozen=True, gc=False, tag_field="outcome", tag="horizon"):
     """No collision before t_end; the state there. A collision exactly at t_end is not before it."""
 
     t: float
@@ -56,19 +56,19 @@ class Horizon(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
     vy: float
 
 
-class Undefined(msgspec.Struct, frozen=True, tag_field="outcome", tag="undefined"):
+class Undefined(msgspec.Struct, frozen=True, gc=False, tag_field="outcome", tag="undefined"):
     """Mathematics gives no answer."""
 
     reason: Literal["corner", "tangency", "sliding", "mouth-edge"]
 
 
-class Undecided(msgspec.Struct, frozen=True, tag_field="outcome", tag="undecided"):
+class Undecided(msgspec.Struct, frozen=True, gc=False, tag_field="outcome", tag="undecided"):
     """This stepper could not decide; it does not guess."""
 
     reason: str
 
 
-class Rejected(msgspec.Struct, frozen=True, tag_field="outcome", tag="rejected"):
+class Rejected(msgspec.Struct, frozen=True, gc=False, tag_field="outcome", tag="rejected"):
     """Bad input, with the reason."""
 
     reason: str

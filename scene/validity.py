@@ -114,14 +114,16 @@ def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
 
 def _is_clear(condition: Condition) -> bool:
     """Tell whether the ranges of the laws prove a condition. For most scenes they do, at little cost."""
-    least = Fraction(0)
+    # Of two floats the sum has the right sign; products are taken exactly.
+    level = float if all(len(factors) == 1 for _, factors in condition.terms) else Fraction
+    least = level(0)
     for sign, factors in condition.terms:
-        ends = [Fraction(sign)]
+        ends = [level(sign)]
         for law in factors:
             lowest, highest, *_ = bounds(law)
             if not (isfinite(lowest) and isfinite(highest)):
                 return False
-            ends = [end * Fraction(level) for end in ends for level in (lowest, highest)]
+            ends = [end * level(bound) for end in ends for bound in (lowest, highest)]
         least += min(ends)
     return least > 0 or (least == 0 and not condition.is_strict)
 

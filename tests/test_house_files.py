@@ -21,9 +21,9 @@ LONGER = {"conformance/verify.py": "one file that anyone can read and run, witho
 # Statements of a folder's Python files (nodes of `ast.stmt`), without docstrings: a bound rises for a new
 # capability only.
 MAX_STATEMENTS = {
-    "scene": 1_390,
+    "scene": 1_391,
     "reference": 1_355,
-    "fast": 3_384,
+    "fast": 3_392,
     "theory": 2_141,
     "conformance": 8_602,
     "mushrooms": 3_520,

@@ -102,7 +102,13 @@ class Echoed(msgspec.Struct, frozen=True):
 
 
 class AnsweredCollision(
-    msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="outcome", tag="collision"
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    omit_defaults=True,
+    gc=False,
+    tag_field="outcome",
+    tag="collision",
 ):
     """A collision in an answer: `scene.Collision`, with two fields that may be absent.
 

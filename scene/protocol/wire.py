@@ -133,7 +133,7 @@ class _Server:
             if isinstance(command, TimeRequest):
                 return self.answer_time(scene, command)
             steps = self.follower(scene, command.state, command.collisions, command.t_end)
-            return {"steps": [_plain(outcome) for outcome in steps]}
+            return {"steps": steps}
         except BadInput as error:
             return _plain(Rejected(str(error)))
         except OwnFailure as failure:
@@ -155,7 +155,7 @@ class _Server:
             raise BadInput("time is not among this implementation's profiles")
         check_count("repeat", command.repeat, 1, MAX_REPEAT)
         ns, last = self.timer(scene, command.state, command.collisions, command.repeat)
-        return {"ns": list(ns), "steps": [_plain(last)]}
+        return {"ns": list(ns), "steps": [last]}
 
     def read_scene(self, raw: bytes) -> Scene:
         if self.kept is None or self.kept[0] != raw:

@@ -21,8 +21,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from mpmath import fp
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Scene
@@ -344,15 +344,20 @@ def loss_probability(found: Energies | Scene, n_cycles: int) -> float:
     slopes = _series(found.root, np.array([-1.0, 0.0]))[1]
     if not slopes[0] < -LEAST < LEAST < slopes[1]:
         raise BadInput("every particle keeps its energy in this cycle: nobody loses")
-    place = brentq(lambda q: float(_series(found.root, np.array([q]))[1, 0]), -1.0, 0.0)
+
+    def slope(q: float) -> tuple[float, float]:
+        _, first, second = _series(found.root, np.array([q]))[:, 0].tolist()
+        return first, 2 * second
+
+    place = solve_rising(fp, slope, -1.0, 0.0)
     return found.lost() if n_cycles == 1 else _lost(found, n_cycles, place)
 
 
 def _series(node: Node, q: Floats) -> Floats:
-    """Return mean exp((q + x) s) over a well, from its top, as coefficients of x^0 and x^1: (2, n)."""
-    orders = np.arange(2)
-    captured: Floats = (node.s[None, :] ** orders[:, None] * node.weights) @ np.exp(np.outer(node.s, q))
-    passed = node.passed * np.exp(node.gain * q) * node.gain ** orders[:, None]
+    """Return mean exp((q + x) s) over a well, from its top, as coefficients of x^0, x^1 and x^2: (3, n)."""
+    orders, shares = np.arange(3)[:, None], np.array([[1.0], [1.0], [0.5]])
+    captured: Floats = (shares * node.s**orders * node.weights) @ np.exp(np.outer(node.s, q))
+    passed = node.passed * np.exp(node.gain * q) * node.gain**orders * shares
     for child in node.children:
         passed = np.array(product(list(passed), list(_series(child, q))))
     total: Floats = captured + passed

@@ -24,7 +24,7 @@ MAX_STATEMENTS = {
     "scene": 1_391,
     "reference": 1_355,
     "fast": 3_392,
-    "theory": 2_143,
+    "theory": 2_144,
     "conformance": 8_602,
     "mushrooms": 3_520,
     "tests": 11_285,

@@ -27,7 +27,7 @@ from conformance.cases.draw import wire_form
 from conformance.strategies import scenes_and_states
 from conformance.vectors import Expectation
 from conformance.verify import Verdict, verify_line
-from reference import chain, rational, start, timeline, walls
+from reference import path, rational, start, timeline, walls
 from reference.arithmetic import MAX_WORK, Arithmetic, sign
 from reference.course import SIDES, Course
 from reference.isolation import Isolator
@@ -489,7 +489,7 @@ def open_always(honest, self, crossing):
     return self._first_hit(walls, self.arithmetic.lower(crossing), None)
 
 
-@faults.replacing(chain, "reflect")
+@faults.replacing(path, "reflect")
 def with_the_wall_reversed(honest, course, hit):
     f_t = course.motion.gradient(hit.wall, hit.time)[2]
     return honest(course, hit._replace(slope=hit.slope - 2 * f_t))
@@ -595,7 +595,7 @@ MUTANTS = {
     ),
     "residual kept": keep_the_residual,
     "wall velocity reversed in the bounce": with_the_wall_reversed,
-    "half the kick": faults.replacing(chain, "reflect")(
+    "half the kick": faults.replacing(path, "reflect")(
         lambda honest, course, hit: honest(course, hit._replace(slope=hit.slope / 2))
     ),
     "left and right swapped": swapped_sides,

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from reference import chain, rational, start
+from reference import path, rational, start
 from reference.arithmetic import Arithmetic, exact_ends, is_below, sign
 from reference.course import Course, Hit
 from reference.isolation import Isolator
@@ -117,7 +117,7 @@ def swept_begins_alone(honest, self, a, b):
         return honest(self, a, b)
 
 
-@replacing(chain, "reflect")
+@replacing(path, "reflect")
 def rounded_rates(honest, course, hit):
     """The wall's speed is taken at the time of day as it rounds to binary64."""
     time = Fraction(float(course.flight.instant + exact_ends(hit.time)[0])) - course.flight.instant

@@ -113,29 +113,18 @@ class MovingWalls:
 
     def gradient(self, wall: Wall, s: Interval) -> tuple[Interval, Interval, Interval]:
         """Enclose the partial derivatives of f by x, y and t at flight time s."""
-        q = self.flight
-        one = self.arithmetic.number(1)
-        zero = self.arithmetic.zero
-        if wall == "base":
-            return zero, -one if isinstance(self.scene, Stem) else one, zero
-        if wall == "floor":
-            return zero, one, self.law("h", s).d1
+        q, f_t = self.flight, self.at_rest(s).wall(wall, s).d1
+        one, zero = self.arithmetic.number(1), self.arithmetic.zero
         if wall == "arc":
-            r = self.law("r", s)
-            return -2 * (q.x + q.vx * s), -2 * (q.y + q.vy * s), 2 * (r.f * r.d1)
-        slope, y = self.law("slope", s), q.y + q.vy * s
-        return (-one if wall == "right" else one), slope.f, self.width(s).d1 + slope.d1 * y
+            return -2 * (q.x + q.vx * s), -2 * (q.y + q.vy * s), f_t
+        if wall in ("left", "right"):
+            return (-one if wall == "right" else one), self.law("slope", s).f, f_t
+        is_down = wall == "base" and isinstance(self.scene, Stem)
+        return zero, -one if is_down else one, f_t
 
     def hessian(self, wall: Wall, s: Interval) -> tuple[Interval, Interval, Interval, Interval]:
         """Enclose f_xx, f_yy, f_yt and f_tt at flight time s; the other second partials are 0."""
-        q = self.flight
-        zero = self.arithmetic.zero
-        if wall == "base":
-            return zero, zero, zero, zero
-        if wall == "floor":
-            return zero, zero, zero, self.law("h", s).d2
-        if wall == "arc":
-            two = self.arithmetic.number(-2)
-            return two, two, zero, square(self.arithmetic, self.law("r", s)).d2
-        slope = self.law("slope", s)
-        return zero, zero, slope.d1, self.width(s).d2 + slope.d2 * (q.y + q.vy * s)
+        f_tt, zero = self.at_rest(s).wall(wall, s).d2, self.arithmetic.zero
+        f_yt = self.law("slope", s).d1 if wall in ("left", "right") else zero
+        curved = self.arithmetic.number(-2) if wall == "arc" else zero
+        return curved, curved, f_yt, f_tt

@@ -81,6 +81,26 @@ class SolvedWell(NamedTuple):
     B_end: Any
 
     @property
+    def passed(self) -> Any:
+        """Probability of not being captured on its own panels."""
+        return Binary.exp(self.A_top - self.A_end)
+
+    @property
+    def gain(self) -> Any:
+        """Gain in log E of passing its own panels uncaptured."""
+        return (self.B_end - self.B_top) - (self.A_end - self.A_top)
+
+    @property
+    def captured(self) -> WeightedPoints:
+        """The particles captured on its own panels, from its top: d p_ell = exp(-A) dA."""
+        share, gain = Binary.exp(self.A_top), self.B_top - self.A_top
+        return [
+            (share * weight * rate * p, s - gain)
+            for panel in self.panels
+            for weight, rate, p, s in zip(panel.grid.weights, panel.rate, panel.p_cha, panel.s, strict=True)
+        ]
+
+    @property
     def absorbed(self) -> Any:
         """-log of the probability of passing the whole well uncaptured (Eq:ps)."""
         return self.A_end - self.A_top + sum(child.absorbed for child in self.children)
@@ -88,28 +108,23 @@ class SolvedWell(NamedTuple):
     @property
     def s_nc(self) -> Any:
         """Gain in log E of passing it uncaptured (Eq:lnEnc/E0)."""
-        own = (self.B_end - self.B_top) - (self.A_end - self.A_top)
-        return own + sum(child.s_nc for child in self.children)
+        return self.gain + sum(child.s_nc for child in self.children)
 
 
 class Placed(NamedTuple):
     """A panel within its cycle.
 
-    s_before, s_after: gains of the wells, off the panel's own path, passed uncaptured before and after it.
-    absorbed: -log of the probability of passing them uncaptured.
+    s: log E1 / E0 of a particle captured here and nowhere else (Eq:lnE/E0).
+    s_before: gain of the wells, off the panel's own path, passed uncaptured before it.
+    absorbed: -log of the probability of passing all wells off that path uncaptured.
     s_below: gain of passing uncaptured what lies below the panel's well's first value.
     """
 
     panel: Panel
+    s: list[Any]
     s_before: Any
-    s_after: Any
     absorbed: Any
     s_below: Any
-
-    @property
-    def s(self) -> list[Any]:
-        """Log E1 / E0 of a particle captured here and nowhere else. Source: Eq:lnE/E0."""
-        return [s + self.s_before + self.s_after for s in self.panel.s]
 
 
 @dataclass(frozen=True)
@@ -144,24 +159,9 @@ class Captures:
             total += panel.grid.integral([(b - a - a * log_g) * p for a, b, log_g, p in columns])
         return total
 
-    def taylor(self, q: Any, order: int, well: SolvedWell | None = None) -> list[Any]:
-        """Return the coefficients, up to `order`, of mean exp((q + x) s) in powers of x, of a well or all."""
-        binary, well = self.binary, well or self.root
-        spent = well.A_end - well.A_top
-        passed = _exponential(binary, binary.exp(-spent), (well.B_end - well.B_top) - spent, q, order)
-        for child in well.children:
-            passed = product(passed, self.taylor(q, order, child))
-        terms = [_exponential(binary, w, s, q, order) for w, s in self.captured(well)]
-        return [binary.fsum(column) for column in zip(passed, *terms, strict=True)]
-
-    def captured(self, well: SolvedWell) -> WeightedPoints:
-        """Return the particles captured on a well's own panels, from its top: d p_ell = exp(-A) dA."""
-        share, gain = self.binary.exp(well.A_top), well.B_top - well.A_top
-        return [
-            (share * weight * rate * p, s - gain)
-            for panel in well.panels
-            for weight, rate, p, s in zip(panel.grid.weights, panel.rate, panel.p_cha, panel.s, strict=True)
-        ]
+    def taylor(self, q: Any, order: int) -> list[Any]:
+        """Return the coefficients, up to `order`, of mean exp((q + x) s) in powers of x."""
+        return mean_exponential(self.binary, self.root, q, order)
 
     def point_masses(self, well: SolvedWell | None = None) -> WeightedPoints:
         """Return the distribution of s as weighted points, exact for what grids resolve; of a well or all."""
@@ -170,14 +170,38 @@ class Captures:
         if well.children:
             grid = Grid(binary, 2 * (6 + self.target // 3))
             below = reduce(lambda x, y: convolve(grid, x, y), map(self.point_masses, well.children))
-        spent = well.A_end - well.A_top
-        share, gain = binary.exp(-spent), (well.B_end - well.B_top) - spent
-        return self.captured(well) + [(share * w, s + gain) for w, s in below]
+        return well.captured + [(well.passed * w, s + well.gain) for w, s in below]
 
 
-def _exponential(binary: Binary, weight: Any, s: Any, q: Any, order: int) -> list[Any]:
+def mean_exponential(system: Any, well: Any, q: Any, order: int) -> list[Any]:
+    """Return the coefficients, up to `order`, of the mean of exp((q + x) s) over a well in powers of x.
+
+    Args:
+        system: number system.
+        well: a `SolvedWell`, or a `theory.branches.Node` in binary64.
+        q: the exponent.
+        order: the highest power.
+    """
+    passed = _exponential(system, well.passed, well.gain, q, order)
+    for child in well.children:
+        passed = product(passed, mean_exponential(system, child, q, order))
+    terms = [_exponential(system, w, s, q, order) for w, s in well.captured]
+    return [system.fsum(column) for column in zip(passed, *terms, strict=True)]
+
+
+def least_exponential(system: Any, well: Any) -> Any:
+    """Return the q in (-1, 0) at which the mean of exp(q s) over a well is least."""
+
+    def slope(q: Any) -> tuple[Any, Any]:
+        _, first, second = mean_exponential(system, well, q, 2)
+        return first, 2 * second
+
+    return solve_rising(system, slope, -system.one, system.zero)
+
+
+def _exponential(system: Any, weight: Any, s: Any, q: Any, order: int) -> list[Any]:
     """Return the coefficients of weight exp((q + x) s) in powers of x."""
-    terms = [weight * binary.exp(q * s)]
+    terms = [weight * system.exp(q * s)]
     for k in range(1, order + 1):
         terms.append(terms[-1] * s / k)
     return terms
@@ -185,7 +209,8 @@ def _exponential(binary: Binary, weight: Any, s: Any, q: Any, order: int) -> lis
 
 def _placed(well: SolvedWell, before: Any, after: Any, absorbed: Any) -> Iterator[Placed]:
     for panel in well.panels:
-        yield Placed(panel, before, after, absorbed, well.s_nc + well.B_top - well.A_top)
+        s = [s + before + after for s in panel.s]
+        yield Placed(panel, s, before, absorbed, well.s_nc + well.B_top - well.A_top)
     for i, child in enumerate(well.children):
         early, late = well.children[:i], well.children[i + 1 :]
         yield from _placed(

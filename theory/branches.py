@@ -50,14 +50,13 @@ class Branch(NamedTuple):
     coefficients: Chebyshev series in 2 x - 1 of nu, t_in, t_out, A, B, log g, shape (6, n).
     ends: their values at x = 0 and 1, shape (6, 2).
     s: the same of log E1 / E0 of a particle captured here and nowhere else (Eq:lnE/E0), shape (n,).
-    s_before, s_after, absorbed, s_below: as in `theory.adiabatic.Placed`.
+    s_before, absorbed, s_below: as in `theory.adiabatic.Placed`.
     """
 
     coefficients: Floats
     ends: Floats
     s: Floats
     s_before: float
-    s_after: float
     absorbed: float
     s_below: float
 
@@ -140,7 +139,7 @@ def crossing(series: Floats, start: float, stop: float, levels: Floats) -> Float
 class Node(NamedTuple):
     """A well as numbers: its captured particles as weighted points, and what passing it uncaptured does.
 
-    weights, s: captured on the well's own panels, from its top.
+    captured: on the well's own panels: weights, and s from its top.
     branches: the same particles as functions of place.
     p_top: probability of being in the chaotic zone at its top.
     passed, gain: probability of not being captured on its own panels, and the gain in log E of that.
@@ -148,8 +147,7 @@ class Node(NamedTuple):
         gains that cancel no rounding is left.
     """
 
-    weights: Floats
-    s: Floats
+    captured: tuple[tuple[float, float], ...]
     branches: tuple[Branch, ...]
     children: tuple[Node, ...]
     p_top: float
@@ -195,7 +193,7 @@ def _branch(found: Captures, k: int) -> Branch:
     coefficients = [[float(c) for c in p.grid.coefficients(values)] for values in functions]
     ends = [[float(values[0]), float(values[-1])] for values in functions]
     s = _kept([float(c) for c in p.grid.coefficients(placed.s)])
-    return Branch(_kept(coefficients), _kept(ends), s, *(float(x) for x in placed[1:]))
+    return Branch(_kept(coefficients), _kept(ends), s, *(float(x) for x in placed[2:]))
 
 
 def _kept(numbers: list[float] | list[list[float]]) -> Floats:
@@ -206,17 +204,13 @@ def _kept(numbers: list[float] | list[list[float]]) -> Floats:
 
 def _node(found: Captures, well: SolvedWell, branches: Iterator[Branch]) -> Node:
     own = tuple(next(branches) for _ in well.panels)
-    points = [[float(w), float(s)] for w, s in found.captured(well)]
-    weights, s = _kept(points).T if points else (np.empty(0), np.empty(0))
-    spent, exp = well.A_end - well.A_top, found.binary.exp
     return Node(
-        weights,
-        s,
+        tuple((float(w), float(s)) for w, s in well.captured),
         own,
         tuple(_node(found, child, branches) for child in well.children),
-        float(exp(-well.A_top)),
-        float(exp(-spent)),
-        float(well.B_end - well.B_top - spent),
+        float(found.binary.exp(-well.A_top)),
+        float(well.passed),
+        float(well.gain),
         float(well.s_nc),
     )
 

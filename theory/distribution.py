@@ -26,10 +26,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Scene
-from theory.adiabatic import Captures
+from theory.adiabatic import Captures, least_exponential, mean_exponential
 from theory.branches import UNRESOLVED, Branch, Floats, Node, X, at, noise, rising_edges, tree
-from theory.chebyshev import product
-from theory.critical import solve_rising
 from theory.precision import finite_array, guarded
 from theory.prediction import converged
 
@@ -177,7 +175,8 @@ class Lattice:
         for child in node.children:
             found *= self._transform(child, most)
         # From the well's top, panel after panel.
-        gains = np.split(node.s, np.cumsum([len(branch.s) for branch in node.branches])[:-1])
+        every = np.array([s for _, s in node.captured])
+        gains = np.split(every, np.cumsum([len(branch.s) for branch in node.branches])[:-1])
         for branch, gain in zip(node.branches, gains, strict=False):
             if np.abs(gain).max() <= most:
                 found += self._captured(branch) / node.p_top
@@ -316,11 +315,7 @@ def _least(found: Captures) -> tuple[Any, ...]:
     if size < binary.mpf(10) ** -found.target:
         return binary.zero, -binary.one / 2
 
-    def slope(q: Any) -> tuple[Any, Any]:
-        p = found.taylor(q, 2)
-        return p[1], 2 * p[2]
-
-    place = solve_rising(binary, slope, -binary.one, binary.zero, -binary.one / 2)
+    place = least_exponential(binary, found.root)
     return -binary.log(found.taylor(place, 0)[0]), place
 
 
@@ -341,27 +336,10 @@ def loss_probability(found: Energies | Scene, n_cycles: int) -> float:
         NotCovered, NotConverged: as `theory.predict`.
     """
     n_cycles, found = check_count("n_cycles", n_cycles, 1, MAX_CYCLES), energies(found)
-    slopes = _series(found.root, np.array([-1.0, 0.0]))[1]
+    slopes = [mean_exponential(fp, found.root, q, 1)[1] for q in (-1.0, 0.0)]
     if not slopes[0] < -LEAST < LEAST < slopes[1]:
         raise BadInput("every particle keeps its energy in this cycle: nobody loses")
-
-    def slope(q: float) -> tuple[float, float]:
-        _, first, second = _series(found.root, np.array([q]))[:, 0].tolist()
-        return first, 2 * second
-
-    place = solve_rising(fp, slope, -1.0, 0.0)
-    return found.lost() if n_cycles == 1 else _lost(found, n_cycles, place)
-
-
-def _series(node: Node, q: Floats) -> Floats:
-    """Return mean exp((q + x) s) over a well, from its top, as coefficients of x^0, x^1 and x^2: (3, n)."""
-    orders, shares = np.arange(3)[:, None], np.array([[1.0], [1.0], [0.5]])
-    captured: Floats = (shares * node.s**orders * node.weights) @ np.exp(np.outer(node.s, q))
-    passed = node.passed * np.exp(node.gain * q) * node.gain**orders * shares
-    for child in node.children:
-        passed = np.array(product(list(passed), list(_series(child, q))))
-    total: Floats = captured + passed
-    return total
+    return found.lost() if n_cycles == 1 else _lost(found, n_cycles, least_exponential(fp, found.root))
 
 
 def _lost(found: Energies, n: int, place: float) -> float:

@@ -129,14 +129,20 @@ class Cycle:
         Source: trelease.
         """
         t = one_of(self.ctx, "t", t)
-        if self.period is None:
+        piece, within = self.capture_at(t)
+        if piece is None:
             return t
-        shift = self.ctx.floor((t - self.start) / self.period) * self.period
+        nu, _ = piece.capture.motion.nu(within)
+        return piece.release.time(nu) + (t - within)
+
+    def capture_at(self, t: Any) -> tuple[CapturePiece | None, Any]:
+        """Return the piece on which particles are captured at time t, if any, and t less whole periods."""
+        if self.period is not None:
+            t -= self.ctx.floor((t - self.start) / self.period) * self.period
         for piece in self.pieces:
-            if piece.capture.upper <= t - shift < piece.capture.lower:
-                nu, _ = piece.capture.motion.nu(t - shift)
-                return piece.release.time(nu) + shift
-        return t
+            if piece.capture.upper <= t < piece.capture.lower:
+                return piece, t
+        return None, t
 
     def _piece(self, nu: Any) -> CapturePiece:
         for piece in self.pieces:  # a well's own pieces come first: the first that fits is the earliest

@@ -64,6 +64,11 @@ class ChebyshevSeries:
         found[0] /= 2
         return ChebyshevSeries(self.ctx, found[: max(len(c) - 1, 1)])
 
+    def place(self, level: Any, low: Any, high: Any, guess: Any = None) -> Any:
+        """Return where the series, monotone from low to high, has a value that it takes there."""
+        sign, rate = (1 if self(low) < self(high) else -1), self.rate()
+        return solve_rising(self.ctx, lambda x: (sign * (self(x) - level), sign * rate(x)), low, high, guess)
+
 
 class _Panel:
     """One panel's s, A and times as series."""
@@ -85,13 +90,8 @@ class _Panel:
         found = [self.binary.zero]
         for place in rough[1:-1]:
             near = self.binary.mpf(float(place))
-            sign = 1 if self.s_bend(near) > 0 else -1
-
-            def rising(x: Any, sign: int = sign) -> tuple[Any, Any]:
-                return sign * self.s_rate(x), sign * self.s_bend(x)
-
             low, high = max(near - REACH, self.binary.zero), min(near + REACH, self.binary.one)
-            found.append(solve_rising(self.binary, rising, low, high, near))
+            found.append(self.s_rate.place(0, low, high, near))
         return [*found, self.binary.one]
 
     def stretches(self) -> Iterator[tuple[Any, Any, Any, Any]]:
@@ -100,14 +100,6 @@ class _Panel:
         values = [self.ends[0], *(self.s(x) for x in places[1:-1]), self.ends[1]]
         for (a, s_a), (b, s_b) in pairwise(zip(places, values, strict=True)):
             yield a, b, s_a, s_b
-
-    def root(self, a: Any, b: Any, is_rising: bool, s: Any) -> Any:
-        sign = 1 if is_rising else -1
-
-        def rising(x: Any) -> tuple[Any, Any]:
-            return sign * (self.s(x) - s), sign * self.s_rate(x)
-
-        return solve_rising(self.binary, rising, a, b)
 
     def flow(self, x: Any) -> Any:
         """Return the probability captured per unit of x."""
@@ -160,7 +152,7 @@ def density_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, .
             for panel, (a, b, s_a, s_b) in stretches:
                 # A level within rounding of an end is taken to lie beside it: the density jumps there.
                 if min(s_a, s_b) + resolution < level < max(s_a, s_b) - resolution:
-                    x = panel.root(a, b, bool(s_a < s_b), level)
+                    x = panel.s.place(level, a, b)
                     total += panel.flow(x) / abs(panel.s_rate(x))
             return total
 
@@ -197,7 +189,7 @@ def cdf_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
                     continue
                 start, stop = a, b
                 if level < max(s_a, s_b) and not is_point_mass:
-                    x = panel.root(a, b, bool(s_a < s_b), level)
+                    x = panel.s.place(level, a, b)
                     start, stop = (a, x) if s_a < s_b else (x, b)
                 total += binary.exp(-panel.A(start)) - binary.exp(-panel.A(stop))
             return total
@@ -256,22 +248,14 @@ def capture_rate_at(scene: Scene, t: Sequence[Any], digits: int = 15) -> tuple[A
 
 
 def _rate(found: Captures, time: Any) -> Any:
-    cycle, ctx, binary = found.cycle, found.cycle.ctx, found.binary
-    if cycle.period is not None:
-        time -= ctx.floor((time - cycle.start) / cycle.period) * cycle.period
-    for piece in cycle.pieces:
-        if piece.capture.upper <= time <= piece.capture.lower:
-            nu, rate = piece.capture.motion.nu(time)
-            stem = piece.capture.motion.stem_share(binary.taken(time), binary.taken(nu))
-            flux = delta_slope(ctx, nu) * rate / (free_share(ctx, nu) + binary.given(stem))
-            return binary.exp(-_spent(found, binary.taken(time))) * binary.taken(flux)
-    return binary.zero
-
-
-def _spent(found: Captures, time: Any) -> Any:
-    """Return A at a time of capture."""
-    binary = found.binary
-    panel = next(p.panel for p in found.placed if p.panel.t_in[0] <= time <= p.panel.t_in[-1])
-    t_in, A = (ChebyshevSeries(binary, panel.grid.coefficients(v)) for v in (panel.t_in, panel.A))
-    rate = t_in.rate()
-    return A(solve_rising(binary, lambda x: (t_in(x) - time, rate(x)), binary.zero, binary.one))
+    ctx, binary = found.cycle.ctx, found.binary
+    piece, within = found.cycle.capture_at(time)
+    if piece is None:
+        return binary.zero
+    nu, rate = piece.capture.motion.nu(within)
+    t = binary.taken(within)
+    stem = piece.capture.motion.stem_share(t, binary.taken(nu))
+    flux = delta_slope(ctx, nu) * rate / (free_share(ctx, nu) + binary.given(stem))
+    panel = next(_Panel(found, p) for p in found.placed if p.panel.t_in[0] <= t <= p.panel.t_in[-1])
+    spent = panel.A(panel.t_in.place(t, binary.zero, binary.one))
+    return binary.exp(-spent) * binary.taken(flux)

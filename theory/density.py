@@ -15,6 +15,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from scene.tables import Scene
 from theory.adiabatic import Captures, Placed
@@ -45,24 +46,16 @@ class Caustic(NamedTuple):
 class ChebyshevSeries:
     """A Chebyshev series over [0, 1] in one number system."""
 
-    def __init__(self, ctx: Any, coefficients: list[Any]) -> None:
-        self.ctx, self.coefficients = ctx, coefficients
+    def __init__(self, ctx: Any, coefficients: Any) -> None:
+        self.ctx, self.coefficients = ctx, np.array(coefficients, dtype=object)
 
     def __call__(self, x: Any) -> Any:
-        """Return the value at x (Clenshaw)."""
-        y, later, now = 2 * x - 1, self.ctx.zero, self.ctx.zero
-        for c in reversed(self.coefficients[1:]):
-            later, now = now, 2 * y * now - later + c
-        return y * now - later + self.coefficients[0]
+        """Return the value at x."""
+        return chebyshev.chebval(2 * x - 1, self.coefficients)
 
     def rate(self) -> ChebyshevSeries:
         """Return the derivative."""
-        c = self.coefficients
-        found = [self.ctx.zero] * (len(c) + 1)
-        for k in range(len(c) - 1, 0, -1):
-            found[k - 1] = found[k + 1] + 4 * k * c[k]  # 2 k, and 2 for the length of [0, 1]
-        found[0] /= 2
-        return ChebyshevSeries(self.ctx, found[: max(len(c) - 1, 1)])
+        return ChebyshevSeries(self.ctx, chebyshev.chebder(self.coefficients, scl=2))
 
     def place(self, level: Any, low: Any, high: Any, guess: Any = None) -> Any:
         """Return where the series, monotone from low to high, has a value that it takes there."""
@@ -86,7 +79,7 @@ class _Panel:
 
     def turns(self) -> list[Any]:
         """Return 0, the turning points of s, and 1."""
-        rough = turns(np.array([float(c) for c in self.s.coefficients]))
+        rough = turns(self.s.coefficients.astype(np.float64))
         found = [self.binary.zero]
         for place in rough[1:-1]:
             near = self.binary.mpf(float(place))

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtr
 
 from scene.refusal import BadInput, check_count, check_number
 from scene.tables import Mushroom, Scene
@@ -44,6 +43,8 @@ def kernel_cdf(x: ArrayLike, variance: ArrayLike) -> Floats:
         x: in log E.
         variance: what diffusion at the uncaptured's speed gives, small beside 1.
     """
+    from scipy.special import ndtr  # here, as it takes longer to load than all of theory
+
     step = np.maximum(np.asarray(variance, dtype=np.float64), LEAST) / 16
     excess = np.exp(np.asarray(x) / 4) - 1 - 1.5 * step + 0.375 * step**2
     return np.asarray(ndtr(excess / np.sqrt(step * (1 - 1.5 * step))), dtype=np.float64)

@@ -22,7 +22,6 @@ from typing import NamedTuple
 import numpy as np
 from mpmath import fp
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 import scene as scenes
 from scene.geometry import table_at
@@ -378,6 +377,8 @@ class Fields:
 
     def at(self, name: str, gain: Floats, t: Floats | float) -> Floats:
         """Interpolate a field; sums are known at the steps' ends, the others in their middles."""
+        from scipy.ndimage import map_coordinates  # here, as it takes longer to load than all of theory
+
         values = self._values[name]
         first = 0.0 if values.shape[1] > N_TIMES else 0.5
         place = (np.asarray(t) - self._start) / self._step - first

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scene.refusal import BadInput, check_count
 from scene.tables import Scene, check_scene
-from theory.adiabatic import Captures, SolvedWell
+from theory.adiabatic import Captures, Placed, SolvedWell
 from theory.cycle import Cycle
 from theory.precision import finite_array, guarded
 from theory.prediction import resolutions
@@ -183,11 +183,10 @@ def _solved(scene: Scene) -> Node:
     # Every curve and histogram of a scene asks for its tree again. Its arrays are shared, hence read only.
     found = next(resolutions(scene, Cycle.of(scene, DIGITS)))
     with found.binary.working():
-        return _node(found, found.root, iter([_branch(found, k) for k in range(len(found.placed))]))
+        return _node(found, found.root, map(_branch, found.placed))
 
 
-def _branch(found: Captures, k: int) -> Branch:
-    placed = found.placed[k]
+def _branch(placed: Placed) -> Branch:
     p = placed.panel
     functions = (p.nu, p.t_in, p.t_out, p.A, p.B, p.log_g)
     coefficients = [[float(c) for c in p.grid.coefficients(values)] for values in functions]

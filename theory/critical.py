@@ -109,16 +109,14 @@ def _bang_bang_spans(ctx: Any, moving: list[BangBang], width: Law, radius: Law) 
             exact.multiply(exact.derivative(w), r),
             exact.scale(exact.multiply(w, exact.derivative(r)), Fraction(-1)),
         )
-        times, orders = [number(ctx, a)], [1 + _multiplicity_at(slope, Fraction(0))]
-        for root in _roots(slope, Fraction(0), b - a):
-            times.append(number(ctx, a) + _refined(ctx, root))
-            orders.append(1 + root.multiplicity)
-        times.append(number(ctx, b))
-        orders.append(1 + _multiplicity_at(slope, b - a))
+        begin, last = number(ctx, a), (number(ctx, b), _multiplicity_at(slope, b - a))
+        roots = _roots(slope, Fraction(0), b - a)
+        turns = [(begin + _refined(ctx, root), root.multiplicity) for root in roots]
+        times = [(begin, _multiplicity_at(slope, Fraction(0))), *turns, last]
         powers = (number(ctx, c) for c in slope)  # cubes cancel in w' r - w r'
-        critical = tuple(times[0] + x for x in quadratic_roots(ctx, *powers))
-        for i in range(len(times) - 1):
-            yield Span(times[i], times[i + 1], orders[i], orders[i + 1], (a + b) / 2, critical)
+        critical = tuple(begin + x for x in quadratic_roots(ctx, *powers))
+        for (start, m), (end, n) in pairwise(times):
+            yield Span(start, end, 1 + m, 1 + n, (a + b) / 2, critical)
 
 
 def _fourier_spans(ctx: Any, length: Any, width: Law, radius: Law) -> list[Span]:

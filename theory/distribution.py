@@ -280,7 +280,6 @@ def sum_of_cycles(found: Energies | Scene, n_cycles: int, *, q: float = 0.0) -> 
 
     Source: sec. 4.2, Fig:n=10.
     """
-    check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
     return Sum(energies(found).root, n_cycles, q)
 
 

@@ -73,12 +73,10 @@ class Rates(NamedTuple):
 class RatesAt(NamedTuple):
     """Rates at T times of a cycle.
 
-    pace: (T,) the walls' speed, as `pace` of the measured scene has it.
     diffusion: (T, M) the variance per path length of kicks of each of MEMORIES.
     lag, square, depletion: (T, S) at SPEEDS.
     """
 
-    pace: Floats
     diffusion: Floats
     lag: Floats
     square: Floats
@@ -89,7 +87,7 @@ def pace(scene: Scene, times: Floats | float) -> Floats:
     """Return the root of the sum of squares of all parameters' rates at times of any shape, as named.
 
     A mouth told as w has another pace than the same mouth told as nu. Rates are over the pace of the scene
-    that was measured, so they are to be multiplied by no other: `RatesAt` has it.
+    that was measured, so they are to be multiplied by no other.
     """
     squares = np.array([values(law, np.asarray(times), 1) ** 2 for law in laws(scene).values()])
     return np.asarray(np.sqrt(squares.sum(axis=0)), dtype=np.float64)
@@ -113,25 +111,18 @@ def frozen_rates(scene: Scene) -> tuple[Rates, bool]:
     Raises:
         NotCovered: there are no rates for the scene or its reverse.
     """
-    found = _found(scene)
-    return found.rates, found.turned
+    _, rates, turned = _found(scene)
+    return rates, turned
 
 
-class _Found(NamedTuple):
-    """A measured scene, its rates, and whether it is the reverse of what was sought."""
-
-    measured: Mushroom
-    rates: Rates
-    turned: bool
-
-
-def _found(scene: Scene) -> _Found:
+def _found(scene: Scene) -> tuple[Mushroom, Rates, bool]:
+    """Return the measured scene, its rates, and whether it is the reverse of what is sought."""
     mushroom = as_mushroom(scene)
     for turned in (False, True):
         sought = backwards(mushroom) if turned else mushroom
         for measured, rates in _table().values():
             if _is_one_cycle(measured, sought):
-                return _Found(measured, rates, turned)
+                return measured, rates, turned
     known = ", ".join(_table())
     raise NotCovered(
         f"no frozen rates of scene {mushroom.name!r} are known, without which nothing is said of a finite"
@@ -149,18 +140,16 @@ def rates_at(scene: Scene, times: Floats) -> RatesAt:
     Raises:
         NotCovered: as `frozen_rates`.
     """
-    known = _found(scene)
-    rates, spans = known.rates, _spans(known.measured)
-    speed = pace(known.measured, -times if known.turned else times)
-    phases = (times / known.measured.period) % 1.0
+    measured, rates, turned = _found(scene)
+    speed = pace(measured, -times if turned else times)
+    phases = (times / measured.period) % 1.0
     columns = [rates.diffusion, rates.lag, rates.square, rates.depletion]
-    found = _between(np.column_stack(columns), 1 - phases if known.turned else phases, spans)
+    found = _between(np.column_stack(columns), 1 - phases if turned else phases, _spans(measured))
     diffusion, found = np.split(found, [len(MEMORIES)], axis=1)
     lag, square, depletion = np.split(found, 3, axis=1)
     return RatesAt(
-        speed,
         diffusion * speed[:, None] ** 2,
-        (-1.0 if known.turned else 1.0) * lag * speed[:, None],
+        (-1.0 if turned else 1.0) * lag * speed[:, None],
         square * speed[:, None] ** 2,
         depletion * speed[:, None] ** 2,
     )
@@ -242,7 +231,6 @@ class CycleCoefficients(NamedTuple):
     """A cycle at T times, midpoints of equal steps from its start.
 
     start, step: of time.
-    times: (T,).
     log_energy: (T,) of the uncaptured, over its value at the start (Eq:dE).
     hazard: (T,) of capture per time, where nu rises that of the reversed cycle (Eq:dps/ps).
     is_capture: (T,) whether nu falls.
@@ -253,7 +241,6 @@ class CycleCoefficients(NamedTuple):
 
     start: float
     step: float
-    times: Floats
     log_energy: Floats
     hazard: Floats
     is_capture: Flags
@@ -282,7 +269,7 @@ def cycle_coefficients(scene: Mushroom) -> CycleCoefficients:
         np.broadcast_to(x, times.shape) for x in (now.w_rate / now.w - rising / height, np.pi * height)
     )
     hazard = np.abs(flux * nu_rate)
-    return CycleCoefficients(start, step, times, log_energy, hazard, nu_rate < 0, shear, crossing, rates)
+    return CycleCoefficients(start, step, log_energy, hazard, nu_rate < 0, shear, crossing, rates)
 
 
 def _clock_start(scene: Mushroom) -> float:

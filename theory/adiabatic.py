@@ -378,7 +378,7 @@ class Descent:
         """Return nu, t_in, t_out, dA / dx, dB / dx and log g at x."""
         binary, (nu, slope) = self.binary, self.at(x)
         root = binary.sqrt((1 - nu) * (1 + nu))
-        free = self._2_by_pi * (binary.angle(nu, root) + nu * root)
+        free = self._2_by_pi * (binary.asin(nu) + nu * root)
         capture, release = self.piece
         t_in, t_out = capture.in_binary(nu), release.in_binary(nu)
         d_delta = -2 * self._2_by_pi * root * slope

@@ -12,7 +12,6 @@ numbers are checked by `scene.refusal`; here are the checks of number systems, n
 arrays, and bounds.
 """
 
-import math
 import threading
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
@@ -33,7 +32,6 @@ R = TypeVar("R")
 MAX_DIGITS = 1000  # excludes nonsense; so many digits of the moving cap may take far over ten minutes
 MAX_ORDER = 64  # of moments and cumulants
 HELD = threading.RLock()
-FEW_BITS = 256  # within which the third power of 2^-53 is followed by rounding
 SPARE_BITS = 24  # sixteen harmonics, each a product with the one before, lose a few
 
 
@@ -61,7 +59,7 @@ class Binary:
     """
 
     mpf, mpc, sqrt, exp, log = gmpy2.mpfr, gmpy2.mpc, gmpy2.sqrt, gmpy2.exp, gmpy2.log
-    cos, sign, fsum, log10 = gmpy2.cos, gmpy2.sign, gmpy2.fsum, gmpy2.log10
+    cos, asin, sign, fsum, log10 = gmpy2.cos, gmpy2.asin, gmpy2.sign, gmpy2.fsum, gmpy2.log10
     zero, one = gmpy2.mpfr(0), gmpy2.mpfr(1)
 
     def __init__(self, ctx: Any) -> None:
@@ -90,15 +88,6 @@ class Binary:
         """Return exp(i x)."""
         sin, cos = gmpy2.sin_cos(x)
         return cos + 1j * sin
-
-    def angle(self, sine: Any, cosine: Any) -> Any:
-        """Return the angle in [0, pi / 2] that has this sine and cosine, at a third of the cost of asin."""
-        if self.prec > FEW_BITS:
-            return gmpy2.asin(sine)
-        near = math.atan2(sine, cosine)
-        sin, cos = gmpy2.sin_cos(near)
-        rest = sine * cos - cosine * sin  # sine of the rest, 2^-53 of the angle
-        return near + (rest + rest * rest * rest / 6)
 
     def workprec(self, prec: int) -> AbstractContextManager[Any]:
         """Compute with so many bits."""

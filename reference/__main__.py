@@ -26,8 +26,7 @@ def step(scene: Scene, state: State, t_end: float) -> Outcome:
 def follow(scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
     """Return the proved collisions of a trajectory, rounded; the last entry may be another outcome."""
     path = reference.trajectory(scene, state, n_collisions, t_end)
-    found = [*path.steps, *([path.outcome] if path.outcome is not None else [])]
-    return [rounded(outcome) for outcome in found]
+    return [rounded(outcome) for outcome in path.outcomes]
 
 
 def clock(scene: Scene, state: State, n_collisions: int, repeat: int) -> tuple[list[int], Outcome]:
@@ -37,7 +36,7 @@ def clock(scene: Scene, state: State, n_collisions: int, repeat: int) -> tuple[l
         begin = time.perf_counter_ns()
         path = reference.trajectory(scene, state, n_collisions)
         ns.append(time.perf_counter_ns() - begin)
-    return ns, rounded(path.outcome if path.outcome is not None else path.steps[-1])
+    return ns, rounded(path.outcomes[-1])
 
 
 if __name__ == "__main__":

@@ -85,3 +85,8 @@ class Trajectory(NamedTuple):
     outcome: Outcome | None
     digits: int
     jacobian: Jacobian | None = None
+
+    @property
+    def outcomes(self) -> list[Outcome]:
+        """The collisions and, if another outcome ended the path early, that one."""
+        return [*self.steps, self.outcome] if self.outcome is not None else [*self.steps]

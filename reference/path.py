@@ -80,13 +80,9 @@ def next_collision(
 
     try:
         state = check_numbers(scene, state, t_end)
-        path = _decided(follow, least, 4 * least)
+        return _decided(follow, least, 4 * least).outcomes[0]
     except InvalidState as error:
         return Rejected(str(error))
-    if path.steps:
-        return path.steps[0]
-    assert path.outcome is not None
-    return path.outcome
 
 
 def trajectory(

@@ -39,15 +39,6 @@ class Span(NamedTuple):
     critical: tuple[Any, ...]
 
 
-class CriticalRoot(NamedTuple):
-    """A real root isolated in [left, right] (equal when it is rational and met exactly)."""
-
-    left: Fraction
-    right: Fraction
-    multiplicity: int
-    simple: exact.Polynomial
-
-
 def spans(ctx: Any, scene: Mushroom) -> list[Span]:
     """Cut one period into spans, in order of time; an empty list when nu never changes.
 
@@ -110,8 +101,7 @@ def _bang_bang_spans(ctx: Any, moving: list[BangBang], width: Law, radius: Law) 
             exact.scale(exact.multiply(w, exact.derivative(r)), Fraction(-1)),
         )
         begin, last = number(ctx, a), (number(ctx, b), _multiplicity_at(slope, b - a))
-        roots = _roots(slope, Fraction(0), b - a)
-        turns = [(begin + _refined(ctx, root), root.multiplicity) for root in roots]
+        turns = [(begin + x, m) for x, m in _roots(ctx, slope, Fraction(0), b - a)]
         times = [(begin, _multiplicity_at(slope, Fraction(0))), *turns, last]
         powers = (number(ctx, c) for c in slope)  # cubes cancel in w' r - w r'
         critical = tuple(begin + x for x in quadratic_roots(ctx, *powers))
@@ -127,9 +117,9 @@ def _fourier_spans(ctx: Any, length: Any, width: Law, radius: Law) -> list[Span]
         return []
     found = [(ctx.zero + length / 2, 2 * (n_w + n_r) - (len(slope) - 1))]  # x = infinity
     bound = exact.root_bound(slope)
-    for root in _roots(slope, -bound, bound):
-        time = length * ctx.atan(_refined(ctx, root)) / ctx.pi
-        found.append((time if time >= 0 else time + length, root.multiplicity))
+    for x, multiplicity in _roots(ctx, slope, -bound, bound):
+        time = length * ctx.atan(x) / ctx.pi
+        found.append((time if time >= 0 else time + length, multiplicity))
     found = sorted((t, m) for t, m in found if m > 0)
     later = [*found[1:], (found[0][0] + length, found[0][1])]
     return [
@@ -144,8 +134,8 @@ def _multiplicity_at(p: exact.Polynomial, x: Fraction) -> int:
     return n
 
 
-def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[CriticalRoot]:
-    """Isolate the distinct roots in the open interval (a, b), in order."""
+def _roots(ctx: Any, p: exact.Polynomial, a: Fraction, b: Fraction) -> list[tuple[Any, int]]:
+    """Return the distinct roots in the open interval (a, b), in order, with their multiplicities."""
     sturms, rest = [], p  # a root of multiplicity m is one of the first m
     while len(rest) > 1:
         sturms.append(exact.Sturm(rest))
@@ -161,21 +151,22 @@ def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[CriticalRoot]:
             continue
         # In an interval of length 1 Newton's method, kept in it, comes to all digits.
         if n == 1 and right - left <= 1 and exact.at(simple, left) != 0 != exact.at(simple, right):
-            found.append(CriticalRoot(left, right, sum(s.n_roots(left, right) for s in sturms), simple))
+            found.append((left, right, sum(s.n_roots(left, right) for s in sturms)))
             continue
         middle = (left + right) / 2
         if exact.at(simple, middle) == 0:
-            found.append(CriticalRoot(middle, middle, _multiplicity_at(p, middle), simple))
+            found.append((middle, middle, _multiplicity_at(p, middle)))
         todo += [(left, middle), (middle, right)]
-    return sorted(found)
+    return [(_refined(ctx, simple, left, right), multiplicity) for left, right, multiplicity in sorted(found)]
 
 
-def _refined(ctx: Any, root: CriticalRoot) -> Any:
-    if root.left == root.right:
-        return number(ctx, root.left)
-    low, high = number(ctx, root.left), number(ctx, root.right)
-    coefficients = [number(ctx, a) for a in reversed(root.simple)]
-    sign = 1 if exact.at(root.simple, root.right) > 0 else -1
+def _refined(ctx: Any, simple: exact.Polynomial, left: Fraction, right: Fraction) -> Any:
+    """Return the only root of a polynomial in [left, right]; the ends are one if it is met exactly."""
+    if left == right:
+        return number(ctx, left)
+    low, high = number(ctx, left), number(ctx, right)
+    coefficients = [number(ctx, a) for a in reversed(simple)]
+    sign = 1 if exact.at(simple, right) > 0 else -1
 
     def rising(x: Any) -> tuple[Any, Any]:
         value = slope = ctx.zero

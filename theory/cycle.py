@@ -278,16 +278,18 @@ def nu_well(ctx: Any, run: list[MonotoneStretch], small: Any) -> NuWell:
     peaks = [i for i in range(1, len(run)) if is_fall(run[i]) and not is_fall(run[i - 1])]
     n_fall = next(i for i, s in enumerate(run) if not is_fall(s))
     last_fall = max(i for i, s in enumerate(run) if is_fall(s))
-    fall, rise = run[:n_fall], run[last_fall + 1 :]
+    fall, rise = run[:n_fall], run[last_fall + 1 :][::-1]
     if not peaks:
-        return NuWell(_pieces(ctx, fall, rise[::-1], small), ())
+        return NuWell(_pieces(ctx, fall, rise, small), ())
     level = max(run[i].nu_upper for i in peaks)
     pieces: tuple[CapturePiece, ...] = ()
     if run[0].nu_upper - level > small:
-        pieces = _pieces(ctx, _above(fall, level, small), _above(rise, level, small)[::-1], small)
+        fall, rise = (_between(branch, ctx.inf, level, small) for branch in (fall, rise))
+        pieces = _pieces(ctx, fall, rise, small)
     parts = [0, *(i for i in peaks if level - run[i].nu_upper <= small), len(run)]
     groups = [run[start:stop] for start, stop in pairwise(parts)]
-    return NuWell(pieces, tuple(nu_well(ctx, _below(group, level, small), small) for group in groups))
+    below = [_between(group, level, ctx.zero, small) for group in groups]
+    return NuWell(pieces, tuple(nu_well(ctx, group, small) for group in below))
 
 
 def is_fall(s: MonotoneStretch) -> bool:
@@ -300,14 +302,10 @@ def tolerance(ctx: Any, run: list[MonotoneStretch]) -> Any:
     return ctx.mpf(10) ** (10 - ctx.dps) * max((s.nu_upper for s in run), default=ctx.one)
 
 
-def _above(branch: list[MonotoneStretch], level: Any, small: Any) -> list[MonotoneStretch]:
-    cut = [s for s in branch if s.nu_upper - level > small]
-    return [s.between(s.nu_upper, max(s.nu_lower, level), small) for s in cut]
-
-
-def _below(branch: list[MonotoneStretch], level: Any, small: Any) -> list[MonotoneStretch]:
-    cut = [s for s in branch if level - s.nu_lower > small]
-    return [s.between(min(s.nu_upper, level), s.nu_lower, small) for s in cut]
+def _between(branch: list[MonotoneStretch], upper: Any, lower: Any, small: Any) -> list[MonotoneStretch]:
+    """Return the parts of a branch on which nu lies between two values."""
+    inside = [s for s in branch if s.nu_upper - lower > small and upper - s.nu_lower > small]
+    return [s.between(min(s.nu_upper, upper), max(s.nu_lower, lower), small) for s in inside]
 
 
 def _next_period(ctx: Any, scene: Mushroom, span: Span) -> Span:

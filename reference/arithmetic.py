@@ -40,13 +40,9 @@ class WorkLimit:
 
     The unit is one evaluation of a parabola at few digits; long numbers cost in proportion. Work is
     counted, not timed, so that an answer does not depend on the machine.
-
-    Args:
-        limit: units allowed.
     """
 
-    def __init__(self, limit: float = MAX_WORK) -> None:
-        self.limit = limit
+    def __init__(self) -> None:
         self.spent = 0.0
 
     def spend(self, units: float) -> None:
@@ -56,8 +52,8 @@ class WorkLimit:
             Exhausted: when it is more than allowed.
         """
         self.spent += units
-        if self.spent > self.limit:
-            raise Exhausted(f"more than {self.limit:.0f} evaluations of the laws")
+        if self.spent > MAX_WORK:
+            raise Exhausted(f"more than {MAX_WORK:.0f} evaluations of the laws")
 
 
 class Enclosure(NamedTuple):

@@ -73,7 +73,6 @@ class _Panel:
             return ChebyshevSeries(self.binary, grid.coefficients(values))
 
         self.s, self.A, self.t_in = series(placed.s), series(placed.panel.A), series(placed.panel.t_in)
-        self.ends = (placed.s[0], placed.s[-1])
         self.A_rate, self.s_rate = series(placed.panel.rate), self.s.rate()
         self.s_bend = self.s_rate.rate()
 
@@ -90,8 +89,7 @@ class _Panel:
     def stretches(self) -> Iterator[tuple[Any, Any, Any, Any]]:
         """Yield monotone stretches: start, stop and s at each."""
         places = self.turns()
-        values = [self.ends[0], *(self.s(x) for x in places[1:-1]), self.ends[1]]
-        for (a, s_a), (b, s_b) in pairwise(zip(places, values, strict=True)):
+        for (a, s_a), (b, s_b) in pairwise(zip(places, map(self.s, places), strict=True)):
             yield a, b, s_a, s_b
 
     def flow(self, x: Any) -> Any:

@@ -32,9 +32,8 @@ from reference.arithmetic import MAX_WORK, Arithmetic, sign
 from reference.course import SIDES, Course
 from reference.isolation import Isolator
 from reference.jets import Jet
-from reference.timeline import Legs, law_in_time
+from reference.timeline import Legs, Waves, law_in_time
 from reference.walls import MovingWalls
-from reference.waves import Waves
 from scene import (
     BangBang,
     Cap,

@@ -16,9 +16,8 @@ from reference.arithmetic import Arithmetic, exact_ends, is_below, sign
 from reference.course import Course, Hit
 from reference.isolation import Isolator
 from reference.jets import Jet, multiply
-from reference.timeline import Legs
+from reference.timeline import Legs, Waves
 from reference.walls import MovingWalls
-from reference.waves import Waves
 from scene.laws import bounds, leg_at
 from scene.tables import laws
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scene.refusal import BadInput, check_count, check_number
+from scene.refusal import BadInput, check_count, check_number, check_seed
 from scene.tables import Mushroom, Scene
 from theory.branches import Branch, Floats, Node, at, chaotic_zone, tree
 from theory.finite_energy.rates import N_TIMES, SPEEDS, Fields, Flags, cycle_coefficients, table_error
@@ -243,7 +243,7 @@ class FiniteEnergy:
         """
         n_cycles = check_count("n_cycles", n_cycles, 1, MOST_DRAWN)
         n = check_count("n", n, 1, MOST_DRAWN // n_cycles)
-        random, a = np.random.default_rng(check_count("seed", seed, 0, 2**64 - 1)), self.point_masses
+        random, a = np.random.default_rng(check_seed(seed)), self.point_masses
         found = np.zeros((n, n_cycles))
         total = np.zeros(n)
         share = np.cumsum(a.weight)

@@ -261,8 +261,8 @@ def captures(cycle: Cycle, target: int, on_progress: Callable[[float], None] = s
             degrees.insert(0, n)
         grids = [Grid(binary, n) for n in degrees]  # each has every other point of the next
 
-        def resolved(piece: CapturePiece, start: tuple[Any, Any]) -> list[Panel]:
-            return _resolved(cycle, grids, piece, start, target, headway)
+        def resolved(piece: CapturePiece) -> list[Sampled]:
+            return _resolved(cycle, grids, piece, target, headway)
 
         root = _solved_well(cycle.well, (binary.zero, binary.zero), resolved)
     return Captures(cycle, target, root)
@@ -279,12 +279,11 @@ def refined(found: Captures, on_progress: Callable[[float], None] = silent) -> C
     with binary.working():
         grids = {n: Grid(binary, 2 * n) for n in {placed.panel.grid.n for placed in found.placed}}
 
-        def doubled(panel: Panel, start: tuple[Any, Any]) -> list[Panel]:
-            known = list(zip(*panel[2:8], strict=True))
-            grid = grids[panel.grid.n]
-            finer = _panel(grid, panel.descent, _with_between(known, grid, panel.descent), start)
+        def doubled(panel: Panel) -> list[Sampled]:
+            grid, known = grids[panel.grid.n], list(zip(*panel[2:8], strict=True))
+            samples = _with_between(known, grid, panel.descent)
             headway.at(1.0)
-            return [finer]
+            return [(grid, panel.descent, samples)]
 
         root = _solved_well(found.root, (binary.zero, binary.zero), doubled)
     target = min(int(2 * PROMISE * found.target), found.cycle.digits + GUARD - 8)
@@ -292,26 +291,24 @@ def refined(found: Captures, on_progress: Callable[[float], None] = silent) -> C
 
 
 def _solved_well(
-    well: NuWell | SolvedWell, start: tuple[Any, Any], solved: Callable[[Any, tuple[Any, Any]], list[Panel]]
+    well: NuWell | SolvedWell, start: tuple[Any, Any], sampled: Callable[[Any], list[Sampled]]
 ) -> SolvedWell:
+    """Integrate over a well from A and B at its top, each of its parts sampled by a function."""
     A, B = start
     panels: list[Panel] = []
     for part in well.pieces if isinstance(well, NuWell) else well.panels:
-        panels += solved(part, (A, B))
-        A, B = panels[-1].A[-1], panels[-1].B[-1]
-    children = tuple(_solved_well(child, (A, B), solved) for child in well.children)
+        for found in sampled(part):
+            panels.append(_panel(*found, (A, B)))
+            A, B = panels[-1].A[-1], panels[-1].B[-1]
+    children = tuple(_solved_well(child, (A, B), sampled) for child in well.children)
     return SolvedWell(tuple(panels), children, *start, A, B)
 
 
 def _resolved(
-    cycle: Cycle,
-    grids: list[Grid],
-    piece: CapturePiece,
-    start: tuple[Any, Any],
-    target: int,
-    headway: Headway,
-) -> list[Panel]:
-    panels: list[Panel] = []
+    cycle: Cycle, grids: list[Grid], piece: CapturePiece, target: int, headway: Headway
+) -> list[Sampled]:
+    """Sample a piece, in parts as short as the grids need."""
+    parts: list[Sampled] = []
     swing = cycle.binary.taken(free_share(cycle.ctx, cycle.nu_max) - free_share(cycle.ctx, cycle.nu_min))
     # Singularities on a branch lie at the values of nu at its knots and critical points. Values that differ
     # by more than `theory.cycle.tolerance` are ends of pieces; what differs by less is one value. So a
@@ -325,8 +322,7 @@ def _resolved(
         descent = todo.pop()
         found = _sampled(grids, descent, target, swing, headway)
         if found is not None:
-            panels.append(_panel(*found, start))
-            start = panels[-1].A[-1], panels[-1].B[-1]
+            parts.append(found)
         elif descent.halvings < most:
             todo += descent.halves()
         else:
@@ -336,7 +332,7 @@ def _resolved(
                 f" by panels of 2^-{most} of a piece"
             )
     headway.at(1.0)
-    return panels
+    return parts
 
 
 class Descent:
@@ -404,9 +400,12 @@ class Descent:
         return solve_rising(self.binary, rising, self.binary.zero, one)
 
 
+Sampled = tuple[Grid, Descent, list[Sample]]  # a part of a piece on a grid that resolves it
+
+
 def _sampled(
     grids: list[Grid], descent: Descent, target: int, swing: Any, headway: Headway
-) -> tuple[Grid, Descent, list[Sample]] | None:
+) -> Sampled | None:
     """Sample a part of a piece on the first grid that resolves it; None when none does.
 
     It is given up where a grid shows that the next will not do. Coefficients fall geometrically, or more

@@ -60,7 +60,7 @@ class Isolator:
         begin: encloses the flight time at which the flight begins.
         residual: f(0) when the particle leaves this wall (the root s = 0 is divided out), else None.
         is_flat: f(0) = f'(0) = 0 exactly, so that only f'' > 0 can prove the start.
-        timeline: gives the knots of the laws, where intervals are best cut; None for a smooth function.
+        timeline: gives the knots of the laws, where intervals are best cut.
         is_never_met: tells whether the wall never comes to where the flight is at a time; None: not known.
         reached: f > 0 is proved up to here, a thin interval; None before the search begins.
         n_excluded: sub-intervals on which f > 0 has been proved.
@@ -72,7 +72,7 @@ class Isolator:
     begin: Interval
     residual: Interval | None = None
     is_flat: bool = field(default=False, kw_only=True)
-    timeline: Timeline | None = field(default=None, kw_only=True)
+    timeline: Timeline = field(kw_only=True)
     is_never_met: Callable[[Interval], bool] | None = field(default=None, kw_only=True)
     reached: Interval | None = field(default=None, init=False)
     n_excluded: int = field(default=0, init=False)
@@ -186,10 +186,10 @@ class Isolator:
 
     def _is_never_reached(self, a: Interval, b: Interval) -> bool:
         """Tell whether the wall never comes, over at least a period, to where the flight is at a nor at b."""
-        ask, low, high = self.is_never_met, exact_ends(a)[0], exact_ends(b)[0]
-        if ask is None or self.timeline is None or not self.timeline.is_whole(high - low):
+        ask, length = self.is_never_met, exact_ends(b)[0] - exact_ends(a)[0]
+        if ask is None or self._may_begin(a) or not self.timeline.is_whole(length):
             return False
-        return not self._may_begin(a) and ask(b) and ask(a)
+        return ask(b) and ask(a)
 
     def _parts(self, a: Interval, b: Interval, whole: Interval, jet: Jet) -> list[tuple[Interval, Interval]]:
         """Cut an interval: around its least value where f is convex, at a knot, or half way."""
@@ -250,8 +250,6 @@ class Isolator:
         raise Undecidable("f has no sign where the interval is split")
 
     def _knot(self, a: Interval, b: Interval) -> Interval | None:
-        if self.timeline is None:
-            return None
         knot = self.timeline.knot_between(exact_ends(a)[0], exact_ends(b)[0])
         return None if knot is None else self.arithmetic.dyadic(knot)
 

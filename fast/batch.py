@@ -129,7 +129,7 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
         if code in WALL_NAMES:
             outcomes.append(Collision(WALL_NAMES[code], *outward(row, units.of_step()).tolist()))
         else:  # without a horizon only what never moves meets no wall
-            place = np.array([state.x, state.y, state.vx, state.vy])
+            place = state.x, state.y, state.vx, state.vy
             outcomes.append(end_of_path(code, scene, state, 0, np.inf, place))
     return outcomes, seconds
 

@@ -23,8 +23,10 @@ from fast.ensemble import follow_many, least_collisions, only_stop
 from fast.kernel import records
 from fast.kernel.fine_step import FineState, fine_path
 from fast.kernel.follow import PATHS, follow_particles
-from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, unfilled_ends
-from fast.kernel.single import ANSWER_LOST
+
+from fast.kernel.records import (  # isort: skip
+    ANCHORS_SHAPE, ANSWER_LOST, Compiled, FloatArray, IntArray, Particle, unfilled_ends,
+)  # fmt: skip
 from fast.kernel.worker import Loops, careful_at, follow_path, new_worker
 from fast.pieces import laws_in_lanes
 
@@ -94,11 +96,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     steps, walls = np.empty((n_collisions, 6)), np.empty(n_collisions, np.int64)
     kernel = PATHS[in_lanes.is_slope_moving, in_lanes.degree]
     with np.errstate(over="ignore", under="ignore"):  # without the compiler
-        n, code, n_exact = follow_path(
-            kernel, (worker, wall, factors, steps, walls), n_collisions, stop.called_off
-        )
-    if n_exact < n:
-        n, code = n_exact, ANSWER_LOST
+        n, code = follow_path(kernel, (worker, wall, factors, steps, walls), n_collisions, stop.called_off)
     steps = steps[:n] if n == n_collisions else steps[:n].copy()  # not all room is held
     outcome: Outcome | None = None
     if n < n_collisions:

@@ -60,8 +60,8 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
     if waves:
         form = TWO_WAVES if laws[SHARED, N_HARMONICS] > 1 else ONE_WAVE
         # Of waves the lanes know when they repeat, and up to when their phase is known.
-        period, until = _period_and_until(laws)
-        pieces = NO_PIECES._replace(period=period, until=until)
+        period = float(_period_and_origin(laws)[0]) if laws[SHARED, OMEGA] else math.inf
+        pieces = NO_PIECES._replace(period=period, until=_until(laws, period))
     else:
         form = SERIES if (laws[:SHARED, KIND] == FOURIER).any() else PARABOLA
         pieces = pieces_of(compiled, form) or NO_PIECES
@@ -113,10 +113,9 @@ def waves_of(compiled: Compiled) -> LaneWaves | None:
     return LaneWaves(*omegas, *(tuple(row.tolist()) for row in rows))
 
 
-def _period_and_until(laws: FloatArray) -> tuple[float, float]:
-    period, _ = _period_and_origin(laws)
-    high = math.inf if period is None else float(period)
-    return high, 0.125 * MAX_QUADRANT * high / max(float(laws[SHARED, N_HARMONICS]), 1.0)
+def _until(laws: FloatArray, period: float) -> float:
+    """Return up to when lanes know the phases of laws of a period."""
+    return 0.125 * MAX_QUADRANT * period / max(float(laws[SHARED, N_HARMONICS]), 1.0)
 
 
 def reach(compiled: Compiled, degree: int) -> float:
@@ -153,11 +152,9 @@ def least_of(compiled: Compiled, row: int | np.integer) -> float:
 
 
 def pieces_of(compiled: Compiled, degree: int) -> Pieces | None:
-    """Return a scene's laws as polynomials of a degree, or None where that would take too many."""
+    """Return a scene's laws, one of which moves, as polynomials of a degree; None if it takes too many."""
     laws = compiled.laws
     period, origin = _period_and_origin(laws)
-    if period is None:
-        return _filled(compiled, None, Fraction(0), [Cut(Fraction(0), Fraction(0), Fraction(0))], degree)
     longest = reach(compiled, degree)
     if not longest > 0.0:
         return None
@@ -202,9 +199,7 @@ def _halves(cut: Cut) -> list[Cut]:
     return [Cut(begin, half, min(2 * half, ends - begin)) for begin in (cut.begin, cut.begin + half)]
 
 
-def _filled(
-    compiled: Compiled, period: Fraction | None, origin: Fraction, cuts: list[Cut], degree: int
-) -> Pieces:
+def _filled(compiled: Compiled, period: Fraction, origin: Fraction, cuts: list[Cut], degree: int) -> Pieces:
     middles = [origin + cut.begin + cut.holds / 2 for cut in cuts]
     references = np.array([split(middle) for middle in middles])
     coefficients = np.empty((len(cuts), 4, degree + 2))
@@ -212,21 +207,17 @@ def _filled(
     begins = np.array([float(cut.begin) for cut in cuts])
     half = INSIDE * np.array([float(cut.holds / 2) for cut in cuts])
     serves = np.array([float(cut.serves - cut.holds / 2) for cut in cuts])
-    if period is None:
-        half, serves = np.array([math.inf]), np.array([math.inf])
-    high, low = split(period) if period is not None else (math.inf, 0.0)
-    _, until = _period_and_until(compiled.laws)
+    high, low = split(period)
+    until = _until(compiled.laws, high)
     return Pieces(float(origin), high, low, begins, references, half, serves, coefficients, until)
 
 
-def _period_and_origin(laws: FloatArray) -> tuple[Fraction | None, Fraction]:
-    """Return the period that all moving laws share, None for none, and when it begins."""
+def _period_and_origin(laws: FloatArray) -> tuple[Fraction, Fraction]:
+    """Return the period that all moving laws share, and when it begins."""
     for row in laws[:SHARED]:
         if row[KIND] == BANG_BANG:
             return Fraction(row[PERIOD]) + Fraction(row[PERIOD_LOW]), Fraction(row[KNOTS])
     omega = Fraction(laws[SHARED, OMEGA]) + Fraction(laws[SHARED, OMEGA_LOW])
-    if not omega:
-        return None, Fraction(0)
     return 4 * HALF_PI / omega, Fraction(0)
 
 

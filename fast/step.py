@@ -48,7 +48,7 @@ REASONS: dict[int, Outcome] = {
     int(records.AT_END): Undecided("a wall is hit at the horizon within rounding"),
     int(records.START): Undecided("the state is on another wall within rounding"),
     int(records.TOO_FAR): Undecided(f"t_end is over {MOST_TO_A_TIME:.0e} collisions away"),
-    int(single.ANSWER_LOST): Undecided(ANSWER_LOST),
+    int(records.ANSWER_LOST): Undecided(ANSWER_LOST),
     int(records.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
 }
 
@@ -79,7 +79,7 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         t, x, y, vx, vy, wall = state.t, state.x, state.y, state.vx, state.vy, WALL_CODES[state.wall]
         ask, numbers = single.single_at_once(), fit(scene).packed
         code, dt, t, x, y, vx, vy = ask(careful_at(), numbers, t, x, y, vx, vy, wall, t_end)
-        if code == single.REFUSED:  # by checks in compiled code: those that follow say why
+        if code == records.BAD_QUESTION:  # by checks in compiled code: those that follow say why
             start_at(scene, state, t_end)[1].horizon(t_end)
     except LateTime as error:
         return Undecided(str(error))

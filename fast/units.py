@@ -31,7 +31,7 @@ from fast.kernel.records import (  # isort: skip
     BANG_BANG, CONSTANT, FOURIER, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, BoolArray, Compiled,
     FloatArray, IntArray,
 )  # fmt: skip
-from scene import BadInput, BangBang, Cap, Fourier, InvalidScene, InvalidState, Law, Mushroom, Scene, State
+from scene import BadInput, BangBang, Cap, Fourier, InvalidScene, InvalidState, Law, Scene, State
 from scene.laws import Bounds, bounds, is_constant, size_bounds
 from scene.tables import laws, period, width_factors
 from scene.transforms import scaled_law, times_power
@@ -58,22 +58,19 @@ def compile_scene(scene: Scene) -> Compiled:
 
 
 def _laid_out(scene: Scene) -> Compiled:
-    r: Law = 0.0 if not isinstance(scene, (Cap, Mushroom)) else scene.r
-    h: Law = 0.0
-    slope: Law = 0.0
-    factors: tuple[Law, ...] = (0.0,)
-    if not isinstance(scene, Cap):
-        h, slope, factors = scene.h, scene.slope, width_factors(scene)
+    given = laws(scene)
+    r, h, slope = (given.get(name, 0.0) for name in ("r", "h", "slope"))
+    factors = (0.0,) if isinstance(scene, Cap) else width_factors(scene)
     rows = [_row(law) for law in (r, factors[0], h, slope)]
     moving = [law for law in (r, *factors, h, slope) if isinstance(law, Fourier) and not is_constant(law)]
-    laws = np.zeros((len(rows) + 1, max(OMEGA_LOW + 1, *(len(row) for row in rows))))
+    table = np.zeros((len(rows) + 1, max(OMEGA_LOW + 1, *(len(row) for row in rows))))
     for i, row in enumerate(rows):
-        laws[i, : len(row)] = row
+        table[i, : len(row)] = row
     for law in moving:
-        laws[SHARED, OMEGA], laws[SHARED, OMEGA_LOW] = _omega(law)
-        laws[SHARED, N_HARMONICS] = max(laws[SHARED, N_HARMONICS], len(law.cos), len(law.sin))
+        table[SHARED, OMEGA], table[SHARED, OMEGA_LOW] = _omega(law)
+        table[SHARED, N_HARMONICS] = max(table[SHARED, N_HARMONICS], len(law.cos), len(law.sin))
     limits = np.array([size_bounds(r), _product_bounds(factors), size_bounds(h), bounds(slope)])
-    return Compiled(TABLES[type(scene).__name__], len(factors) == 2, laws, limits)
+    return Compiled(TABLES[type(scene).__name__], len(factors) == 2, table, limits)
 
 
 def _omega(law: Fourier) -> tuple[float, float]:

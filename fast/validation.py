@@ -8,11 +8,11 @@ import math
 import numbers
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import pairwise
 
 from scene import InvalidState, Scene, State
-from scene.refusal import BadInput, check_count, check_number, listed, shown
+from scene.refusal import BadInput, check_count, check_list, check_number, shown
 from scene.states import check_numbers
 
 MAX_STEPS = 10**7  # collisions of one trajectory, kept in memory: half a gigabyte
@@ -34,19 +34,12 @@ def check_end(t_end: object) -> float:
 def check_states(scene: Scene, states: object) -> list[State]:
     """Return states whose numbers are floats; InvalidState names the particle."""
     found = []
-    for i, state in enumerate(_check_sequence("states", states, "State")):
+    for i, state in enumerate(check_list("states", states, "a sequence of State")):
         try:
-            found.append(check_numbers(scene, state, sys.float_info.max))  # type: ignore[arg-type]  # of whatever type
+            found.append(check_numbers(scene, state, sys.float_info.max))
         except BadInput as error:
             raise InvalidState(f"particle {i}: {error}") from None
     return found
-
-
-def _check_sequence(field: str, value: object, of_what: str) -> Sequence[object]:
-    given = listed(value)
-    if isinstance(given, str | bytes) or not isinstance(given, Sequence):
-        raise BadInput(f"{field} = {shown(value)}, must be a sequence of {of_what}")
-    return given
 
 
 def check_energy(energy: object) -> float:
@@ -59,7 +52,7 @@ def check_energy(energy: object) -> float:
 
 def check_phases(phases: object) -> tuple[float, ...]:
     """Return fractions of a cycle that rise and lie in (0, 1)."""
-    given = _check_sequence("phases", phases, "numbers that rise and lie in (0, 1)")
+    given = check_list("phases", phases, "a sequence of numbers that rise and lie in (0, 1)")
     found = tuple(check_number(f"phases[{i}]", phase) for i, phase in enumerate(given))
     if any(not a < b for a, b in pairwise([0.0, *found, 1.0])):
         raise BadInput(f"phases = {shown(list(found))}, must rise and lie in (0, 1)")

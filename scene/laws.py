@@ -17,9 +17,10 @@ from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
+from msgspec.structs import force_setattr
 from numpy.typing import NDArray
 
-from scene.refusal import BadInput, InvalidScene, check_number, listed, shown
+from scene.refusal import BadInput, InvalidScene, check_list, check_number, listed, shown
 
 MAX_HARMONICS = 16  # validity is decided by exact algebra, whose cost grows steeply with the degree
 MAX_KNOTS = 256
@@ -53,16 +54,16 @@ class Fourier(
         Raises:
             InvalidScene: naming the field, the value and the bound.
         """
-        _keep(self, "mean", check_number("fourier.mean", self.mean, InvalidScene))
+        force_setattr(self, "mean", check_number("fourier.mean", self.mean, InvalidScene))
         for field in ("cos", "sin"):
-            _keep(self, field, amplitudes(f"fourier.{field}", getattr(self, field)))
+            force_setattr(self, field, amplitudes(f"fourier.{field}", getattr(self, field)))
         if (self.omega is None) == (self.period is None):
             raise InvalidScene("fourier needs exactly one of `omega` and `period`")
         field = "omega" if self.period is None else "period"
         size = check_number(f"fourier.{field}", getattr(self, field), InvalidScene)
         if size <= 0:
             raise InvalidScene(f"fourier.{field} = {size}, must be finite and > 0")
-        _keep(self, field, size)
+        force_setattr(self, field, size)
 
     def __call__(self, t: Any) -> Any:
         """Return the value at a time, or an array of values at an array of times."""
@@ -87,12 +88,10 @@ class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", f
         Raises:
             InvalidScene: naming the knot, the value and the bound.
         """
-        knots = listed(self.knots)
-        if not isinstance(knots, tuple | list):
-            raise InvalidScene(f"bang-bang.knots = {shown(knots)}, must be a list of pairs [time, value]")
+        knots = check_list("bang-bang.knots", self.knots, "a list of pairs [time, value]", InvalidScene)
         if not 2 <= len(knots) <= MAX_KNOTS:
             raise InvalidScene(f"bang-bang.knots has {len(knots)} knots, must have 2 to {MAX_KNOTS}")
-        _keep(self, "knots", tuple(checked_knot(i, knot) for i, knot in enumerate(knots)))
+        force_setattr(self, "knots", tuple(checked_knot(i, knot) for i, knot in enumerate(knots)))
         check_legs(self.knots)
 
     def __call__(self, t: Any) -> Any:
@@ -103,15 +102,13 @@ class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", f
 Law = float | Fourier | BangBang
 
 
-def amplitudes(field: str, numbers: object) -> tuple[float, ...]:
+def amplitudes(field: str, given: object) -> tuple[float, ...]:
     """Return a Fourier law's amplitudes.
 
     Raises:
         InvalidScene: they are not a list of finite numbers, or too many.
     """
-    numbers = listed(numbers)
-    if not isinstance(numbers, tuple | list):
-        raise InvalidScene(f"{field} = {shown(numbers)}, must be a list of numbers")
+    numbers = check_list(field, given, "a list of numbers", InvalidScene)
     if len(numbers) > MAX_HARMONICS:
         raise InvalidScene(f"{field} has {len(numbers)} harmonics, at most {MAX_HARMONICS} are allowed")
     return tuple(check_number(f"{field}[{k}]", number, InvalidScene) for k, number in enumerate(numbers))
@@ -150,11 +147,6 @@ def check_legs(knots: tuple[tuple[float, float], ...]) -> None:
     span = end - start
     if not math.isfinite(span) or Fraction(span) != Fraction(end) - Fraction(start):
         raise InvalidScene(f"bang-bang.knots span {start} to {end}: the period must be a binary64 number")
-
-
-def _keep(law: msgspec.Struct, field: str, value: Any) -> None:
-    if getattr(law, field) is not value:
-        msgspec.structs.force_setattr(law, field, value)
 
 
 class Period(NamedTuple):

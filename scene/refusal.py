@@ -6,6 +6,7 @@ line that names the field, the value and the bound, never in a traceback from de
 
 import math
 import numbers
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -75,6 +76,24 @@ def check_number(field: str, value: object, refusal: type[BadInput] = BadInput) 
     if not math.isfinite(number):
         raise refusal(f"{field} = {number}, must be finite")
     return number
+
+
+def check_list(field: str, value: object, what: str, refusal: type[BadInput] = BadInput) -> Sequence[Any]:
+    """Return a list, a tuple or the like, text excepted.
+
+    Args:
+        field: its name, for the message.
+        value: a sequence, or an array of numpy.
+        what: what it must be, for the message.
+        refusal: the error to raise.
+
+    Raises:
+        BadInput: or the error given as `refusal`, naming field, value and what it must be.
+    """
+    given = listed(value)
+    if isinstance(given, str | bytes) or not isinstance(given, Sequence):
+        raise refusal(f"{field} = {shown(given)}, must be {what}")
+    return given
 
 
 def listed(value: object) -> Any:

@@ -29,7 +29,7 @@ from fast import pieces, units
 from fast import step as stepper
 from fast.batch import lane_steps
 from fast.kernel import arithmetic, records
-from fast.kernel.single import REFUSED
+from fast.kernel.records import BAD_QUESTION
 from fast.units import compile_scene, fit
 from scene import (
     BadInput,
@@ -323,7 +323,8 @@ def test_a_kernel_that_overlooks_the_wall_is_found(monkeypatch):
 
     def lenient(*question):
         found = single(*question)
-        return single(*question[:-2], int(records.NO_WALL), question[-1]) if found[0] == REFUSED else found
+        free = (*question[:-2], int(records.NO_WALL), question[-1])
+        return single(*free) if found[0] == BAD_QUESTION else found
 
     monkeypatch.setattr(stepper.single, "single_at_once", lambda: lenient)
     assert differing(1, 300)

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from mpmath import MPContext
 from numba import config, types
 from numba.extending import intrinsic
 
 from fast.kernel.compiling import kept, kernel, packed, part
+from scene.precision import decimals
 
 SAFETY = 8.0 * 2.0**-53  # eight units in the last place of the summed sizes of a sum's terms
 MAX_QUADRANT = 2.0**27
@@ -41,14 +41,7 @@ def split(number: Fraction, n: int = 2) -> list[float]:
     return found
 
 
-def _half_pi() -> Fraction:
-    """Return pi / 2 to 300 bits."""
-    ctx = MPContext()
-    ctx.prec = 300
-    return Fraction(*map(int, (ctx.pi / 2).as_integer_ratio()))
-
-
-HALF_PI = _half_pi()
+HALF_PI = Fraction(*map(int, (decimals(90).pi / 2).as_integer_ratio()))  # to some 300 bits
 
 
 @intrinsic

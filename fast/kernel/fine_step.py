@@ -20,7 +20,7 @@ from fast.kernel.compiling import kept, kernel
 from fast.kernel.laws import leg_at, set_anchors
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, ARC, BANG_BANG, BASE, BEYOND, DEPTH, FAR_TIME, FLOOR, FOURIER, HORIZON, KIND, KNOTS, LEVEL,
+    AMPLITUDES, ARC, BANG_BANG, BASE, BEYOND, DEPTH, FAR_TIME, FLOOR, HORIZON, KIND, KNOTS, LEVEL,
     NO_WALL, N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, PHASE, PHASE_ERROR, RADIUS, RIGHT,
     SHARED, SLOPE, TANGENT, WIDTH, Particle,
 )  # fmt: skip
@@ -85,43 +85,39 @@ def bend_of(laws, row, half_leg):
 
 @kernel
 def law(laws, row, t):
-    """Return a law's value and derivative."""
-    if laws[row, KIND] == FOURIER:
-        n = int(laws[row, N_HARMONICS])
-        f, rate = (laws[row, LEVEL], 0.0), ZERO
-        for k in range(1, n + 1):
-            sine, cosine, _ = fine_sine_cosine(phase(laws, row, float(k), t))
-            a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
-            f = add(f, add(times(a, cosine), times(b, sine)))
-            rate = add(rate, times(float(k), sub(times(b, cosine), times(a, sine))))
-        return f, mul(frequency(laws, row), rate)
+    """Return a law's value and derivative; a constant law is a Fourier law without harmonics."""
     if laws[row, KIND] == BANG_BANG:
         half_leg, _, u = half_leg_at(laws, row, t)
         a = bend_of(laws, row, half_leg)
         knot = laws[row, KNOTS + int(laws[row, N_KNOTS]) + (half_leg + 1) // 2]
         return add((knot, 0.0), times(0.5, mul(a, mul(u, u)))), mul(a, u)
-    return (laws[row, LEVEL], 0.0), ZERO
+    n = int(laws[row, N_HARMONICS])
+    f, rate = (laws[row, LEVEL], 0.0), ZERO
+    for k in range(1, n + 1):
+        sine, cosine, _ = fine_sine_cosine(phase(laws, row, float(k), t))
+        a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
+        f = add(f, add(times(a, cosine), times(b, sine)))
+        rate = add(rate, times(float(k), sub(times(b, cosine), times(a, sine))))
+    return f, mul(frequency(laws, row), rate)
 
 
 @kernel
 def increment(laws, row, t, s):
     """Return a law's f(t + s) - f(t), without cancellation."""
-    if laws[row, KIND] == FOURIER:
-        n, change = int(laws[row, N_HARMONICS]), ZERO
-        for k in range(1, n + 1):
-            half = phase(laws, row, 0.5 * k, s)
-            sine, cosine, _ = fine_sine_cosine(add(phase(laws, row, float(k), t), half))
-            across, _, _ = fine_sine_cosine(half)
-            a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
-            change = add(change, mul(times(2.0, across), sub(times(b, cosine), times(a, sine))))
-        return change
     if laws[row, KIND] == BANG_BANG:
         half_leg, n_periods, u = half_leg_at(laws, row, t)
         later, n_later, _ = half_leg_at(laws, row, add(t, s))
         if later == half_leg and n_later == n_periods:
             return mul(mul(bend_of(laws, row, half_leg), s), add(u, times(0.5, s)))
         return sub(law(laws, row, add(t, s))[0], law(laws, row, t)[0])
-    return ZERO
+    n, change = int(laws[row, N_HARMONICS]), ZERO
+    for k in range(1, n + 1):
+        half = phase(laws, row, 0.5 * k, s)
+        sine, cosine, _ = fine_sine_cosine(add(phase(laws, row, float(k), t), half))
+        across, _, _ = fine_sine_cosine(half)
+        a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
+        change = add(change, mul(times(2.0, across), sub(times(b, cosine), times(a, sine))))
+    return change
 
 
 @kernel

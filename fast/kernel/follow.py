@@ -31,12 +31,12 @@ from fast.kernel.lanes import (  # isort: skip
     side_curvature, stay_after,
 )  # fmt: skip
 from fast.kernel.records import (  # isort: skip
-    ANEW, ARC, AS_GIVEN, CAP, CAPTURED, CLEARLY, COARSE, END, FAR, FATE, HIT, HORIZON, LANES, LATE, LAWS,
-    MARKED, MAX_CORRECTIONS, MOVED, MUSHROOM, NEVER, NOT_YET, N_ARC, N_BASE, N_ROWS, N_WALLS, ON_ARC,
-    ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, OVER, PIECE, POOL_SIZE, R0, R1, RADIUS, REF, S, SINCE, SPIN, STAY,
-    STAY_IN, STAY_OUT, STEM, STOP, STRIDE, SURE, T, TOO_FAR, TRIES, T_LOW, UNTIL, VALUE, VX, VY, W0_LOW,
-    WALL, WHEN, WIDTH, X, Y, Particle, copy_rows, load, particle_at, particle_of, put_particle, refold,
-    whole_registers, write_state, write_step,
+    ANEW, ANSWER_LOST, ARC, AS_GIVEN, CAP, CAPTURED, CLEARLY, COARSE, END, FAR, FATE, HIT, HORIZON, LANES,
+    LATE, LAWS, MARKED, MAX_CORRECTIONS, MOVED, MUSHROOM, NEVER, NOT_YET, N_ARC, N_BASE, N_FLOOR, N_LEFT,
+    N_RIGHT, N_ROWS, N_WALLS, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, OVER, PIECE, POOL_SIZE, R0, R1,
+    RADIUS, REF, S, SINCE, SPIN, STAY, STAY_IN, STAY_OUT, STEM, STOP, STRIDE, SURE, T, TOO_FAR, TRIES,
+    T_LOW, UNTIL, VALUE, VX, VY, W0_LOW, WALL, WHEN, WIDTH, X, Y, Particle, copy_rows, load, particle_at,
+    particle_of, put_particle, refold, whole_registers, write_state, write_step,
 )  # fmt: skip
 from fast.kernel.scalar_step import KNOWN, NEAR
 from fast.kernel.worker import DISK, FORMS, GENERAL, NEXT_STOP, PARTICLE, run_careful, run_step
@@ -231,10 +231,7 @@ def step_carefully(pool, a, i, roster, worker):
 @part
 def collisions_of(a, i):
     """Return how many collisions a lane's particle has had."""
-    total = 0.0
-    for wall in range(N_WALLS):
-        total += a[N_ARC + wall * STRIDE + i]
-    return total
+    return a[N_ARC + i] + a[N_BASE + i] + a[N_LEFT + i] + a[N_RIGHT + i] + a[N_FLOOR + i]
 
 
 @part
@@ -501,24 +498,25 @@ def _path(is_slope_moving, form):
         """Follow a worker's one particle through as many collisions as there is room for in steps and walls.
 
         Returns:
-            How many there are, the last wall's code or what came instead, and how many steps lost no bit by
-            `factors`, before the first that did: see `write_step`.
+            How many there are, and the last wall's code or what came instead: ANSWER_LOST before a step that
+            loses a bit by `factors`, see `write_step`.
         """
         laws = worker.laws
         waves, slope = laws.waves if is_waves else None, None if is_slope_moving else laws.slope
         states, a = worker.followed.states, worker.pools[GENERAL]
         load(a, FIRST, particle_at(states, 0, wall), False)
-        code, n, n_exact = wall, 0, steps.shape[0]
+        code, n = wall, 0
         while n < steps.shape[0] and worker.stops.called_off[0] == 0:
             code = next_hit(a, worker, waves, slope, degree)
             if code >= HORIZON:
                 break
-            walls[n] = code
             if not write_step(steps, n, factors, a[S], particle_of(a, FIRST)):
-                n_exact = min(n_exact, n)
+                code = ANSWER_LOST
+                break
+            walls[n] = code
             n += 1
         write_state(states, 0, particle_of(a, FIRST))
-        return n, code, n_exact
+        return n, code
 
     return follow_path
 

@@ -74,8 +74,6 @@ def third_derivative(a, place, stride, u, degree):
 @kernel
 def piece_at(pieces, t, t_low):
     """Return the number of the piece that serves at a time, and its reference time as a sum of two floats."""
-    if not pieces.period < np.inf:
-        return 0, pieces.references[0, 0], 0.0
     origin, period, period_low = pieces.origin, pieces.period, pieces.period_low
     n_periods, tau = whole_periods(origin, period, period_low, t, t_low)
     low, high = 0, pieces.begins.shape[0]
@@ -99,7 +97,6 @@ def expand_waves(laws, anchors, row, out):
     rounding must, too.
     """
     n, scale = int(laws[row, N_HARMONICS]), laws[row, OMEGA]
-    out[2:] = 0.0
     for j in range(3, out.shape[0]):
         scale *= laws[row, OMEGA] / (j - 1)
         total = (0.0, 0.0)

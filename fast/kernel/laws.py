@@ -56,8 +56,7 @@ def set_phases(laws, anchors, t_hi, t_lo):
         anchors[PHASE, COSINE + k] = c
         anchors[PHASE, SINE_LOW + k] = s_low
         anchors[PHASE, COSINE_LOW + k] = c_low
-        nearest = min(abs(s), abs(c))
-        worst = max(worst, nearest)
+        worst = max(worst, min(abs(s), abs(c)))
     # What the low parts lack: the sixth power of the angle from the nearest quarter turn.
     anchors[PHASE, PHASE_ERROR] = 2.0**-59 * worst**6 + 2.0**-98
     return True
@@ -115,16 +114,10 @@ def set_anchors(laws, anchors, t_hi, t_lo):
     if not set_phases(laws, anchors, t_hi, t_lo):
         return False
     for row in (RADIUS, WIDTH, DEPTH, SLOPE):
-        if laws[row, KIND] == FOURIER:
+        if laws[row, KIND] != BANG_BANG:
             set_waves(laws, anchors, row)
-        elif laws[row, KIND] == BANG_BANG:
-            if not set_leg(laws, anchors, row, t_hi, t_lo):
-                return False
-        else:
-            anchors[row, VALUE] = laws[row, LEVEL]
-            anchors[row, RATE] = 0.0
-            anchors[row, TERMS] = 0.0
-            anchors[row, VALUE_LOW] = 0.0
+        elif not set_leg(laws, anchors, row, t_hi, t_lo):
+            return False
     if is_cancelled(laws, anchors):
         set_fine_phases(laws, anchors, t_hi, t_lo)
         for row in (RADIUS, WIDTH, DEPTH, SLOPE):
@@ -136,11 +129,10 @@ def set_anchors(laws, anchors, t_hi, t_lo):
 @part
 def is_cancelled(laws, anchors):
     """Tell whether a Fourier law that is a size is so small now that its terms must be known better."""
-    found = False
     for row in (RADIUS, WIDTH, DEPTH):
         if laws[row, KIND] == FOURIER and anchors[row, VALUE] < CANCELLED * laws[row, LEVEL]:
-            found = True
-    return found
+            return True
+    return False
 
 
 @kernel
@@ -153,7 +145,10 @@ def add_product(total, low, a, b, b_low):
 
 @part
 def set_waves(laws, anchors, row):
-    """Anchor a Fourier law from the phases stored; its terms may cancel, hence sums of two floats."""
+    """Anchor a Fourier law from the phases stored; its terms may cancel, hence sums of two floats.
+
+    A constant law is one without harmonics.
+    """
     n = int(laws[row, N_HARMONICS])
     f, f_low = laws[row, LEVEL], 0.0
     rate, rate_low = 0.0, 0.0

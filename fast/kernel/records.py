@@ -20,8 +20,9 @@ HORIZON, SLIDING, MOUTH_EDGE, ON_CORNER = np.array([10, 20, 21, 22])
 FAR_TIME, TOO_MANY, TANGENT, CORNER, EDGE, START, AT_END, TOO_FAR = np.arange(31, 39)
 # A refused state moves into the wall that it leaves, or lies beyond a wall: BEYOND plus that wall's code; or
 # it is off the wall that it names. ANEW is no end: a particle that cannot go on from where it was kept, and
-# is to be followed from its start.
-APPROACHING, BEYOND, ANEW, OFF_WALL = np.array([40, 41, 50, 52])
+# is to be followed from its start. A BAD_QUESTION is refused. ANSWER_LOST: a number of the answer does not
+# fit into binary64.
+APPROACHING, BEYOND, ANEW, OFF_WALL, BAD_QUESTION, ANSWER_LOST = np.array([40, 41, 50, 52, 53, 54])
 CAP, STEM, MUSHROOM = np.arange(3)
 
 
@@ -133,7 +134,7 @@ class Pieces(NamedTuple):
     """A scene's laws over one period, as P pieces: polynomials of degree D about reference times.
 
     The polynomials of a piece hold from the time at which it begins to serve until `limits` after its
-    reference time: `fast.pieces` proves how well. A scene without a period has one piece, for all time.
+    reference time: `fast.pieces` proves how well.
 
     Attributes:
         origin, period, period_low: when the first piece begins, and the period as a sum of two floats;

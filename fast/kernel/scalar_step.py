@@ -435,13 +435,12 @@ def bounce(wall, place, vx, vy, scene, anchors):
 def settled(s, particle, scene, anchors):
     """Return the time of a hit of the wall left, right to its last bit, with f, f' and f's error there."""
     wall = particle.wall
-    f, slope, error, _ = wall_function(wall, s, particle, 0.0, scene, anchors)
-    for _ in range(MAX_POLISHES):
+    for n_polishes in range(MAX_POLISHES + 1):
+        f, slope, error, _ = wall_function(wall, s, particle, 0.0, scene, anchors)
         change = f / -slope
-        if not abs(change) > 2.0**-52 * s:
+        if n_polishes == MAX_POLISHES or not abs(change) > 2.0**-52 * s:
             break
         s += change
-        f, slope, error, _ = wall_function(wall, s, particle, 0.0, scene, anchors)
     return s, f, slope, error
 
 

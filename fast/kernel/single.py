@@ -12,27 +12,22 @@ import numpy as np
 from numba import config, types
 
 from fast.kernel.compiling import kept, kernel, part
-from fast.kernel.records import ANCHORS_SHAPE, HORIZON, OFF_WALL, SHARED, Compiled, Particle
+
+from fast.kernel.records import (  # isort: skip
+    ANCHORS_SHAPE, ANSWER_LOST, BAD_QUESTION, HORIZON, OFF_WALL, SHARED, Compiled, Particle,
+)  # fmt: skip
 from fast.kernel.scalar_step import GIVEN
 from fast.kernel.worker import run_careful
+from scene.transforms import times_power
 
-# Beside those of fast.kernel.records: the question is no good, and the answer does not fit into binary64.
-REFUSED, ANSWER_LOST = np.array([53, 54])
 # Squares of what is larger overflow.
 LARGEST = 2.0**400
 LENGTH, TIME = 96, 32  # exponents of a table's size and period in the kernel
 LARGEST_FLOAT = float(np.finfo(np.float64).max)
 
 
-def _plain_ldexp(number, exponent):
-    try:
-        return math.ldexp(number, exponent)
-    except OverflowError:
-        return math.copysign(math.inf, number)
-
-
 # Python's own ldexp raises where C has infinity.
-ldexp = _plain_ldexp if config.DISABLE_JIT else math.ldexp
+ldexp = times_power if config.DISABLE_JIT else math.ldexp
 
 
 def pack_scene(scene, length, time):
@@ -108,11 +103,11 @@ def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
     time = static_time(length, max(abs(vx), abs(vy))) if np.isnan(numbers[3]) else int(numbers[3])
     is_good, particle, end = question(Particle(t, 0.0, x, y, vx, vy, wall), t_end, length, time)
     if not is_good:
-        return REFUSED, 0.0, t, x, y, vx, vy
+        return BAD_QUESTION, 0.0, t, x, y, vx, vy
     known = particle, end - particle.t, GIVEN, unpack_scene(numbers), np.zeros(ANCHORS_SHAPE)
     code, dt, p = run_careful(step_at, known)
     if code > HORIZON:
-        return (REFUSED if code == OFF_WALL else code), 0.0, t, x, y, vx, vy
+        return (BAD_QUESTION if code == OFF_WALL else code), 0.0, t, x, y, vx, vy
     if code == HORIZON:  # neither time is asked for
         dt, p = 0.0, Particle(0.0, 0.0, p.x, p.y, p.vx, p.vy, p.wall)
     after, is_kept = rescaled(p, length, time)

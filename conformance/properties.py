@@ -40,6 +40,7 @@ import msgspec
 from mpmath import fp
 
 from conformance import plain
+from conformance.vectors import question
 from scene import (
     Collision,
     Horizon,
@@ -49,7 +50,6 @@ from scene import (
     State,
     Undecided,
     Undefined,
-    to_data,
     transforms,
 )
 from scene.geometry import table_at
@@ -417,10 +417,7 @@ def fail(name: str, text: str, *questions: Question) -> NoReturn:
     Raises:
         AssertionError: always.
     """
-    lines = []
-    for scene, state, t_end in questions:
-        asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
-        lines.append(json.dumps({"cmd": "step", "seq": 1, **asked}))
+    lines = [json.dumps({"cmd": "step", "seq": 1, **question("step", *asked)}) for asked in questions]
     raise AssertionError("; ".join([f"{name}: {text}", *lines]))
 
 

@@ -22,7 +22,7 @@ import theory
 from conformance import plain, profiles, properties
 from conformance.cases.draw import Draw
 from conformance.profiles import Statistic
-from conformance.suite.checks.form import FOREVER, Implementation, Question, SuiteCheck, octaves, question
+from conformance.suite.checks.form import FOREVER, Implementation, Question, SuiteCheck, octaves
 from conformance.suite.checks.paths import (
     CARRIED,
     MAX_HITS,
@@ -35,6 +35,7 @@ from conformance.suite.checks.paths import (
 from conformance.suite.checks.requests import INSIDE, RESTING, move_inwards
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import read_outcome
+from conformance.vectors import question
 from scene import (
     Cap,
     Collision,
@@ -238,11 +239,8 @@ def _hold(
         CheckFailure: declined, where it could not have failed.
     """
     findings = test(partial(_flow, side), scene, size, seed)
+    profiles.require(findings)
     why = "; ".join(map(str, findings))
-    assert all(finding.is_met for finding in findings), why
-    assert not any(finding.is_depleted for finding in findings), (
-        f"{why}: at most {profiles.MAX_LOST:.0%} may be lost"
-    )
     if idle := [finding for finding in findings if not finding.has_power]:
         alternatives = ", ".join(f"{finding.alternative:g}" for finding in idle)
         raise CheckFailure(

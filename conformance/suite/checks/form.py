@@ -17,6 +17,7 @@ from conformance.cases.draw import Draw
 from conformance.suite.process import NOT_NUMBERS, CheckFailure
 from conformance.suite.result import Result
 from conformance.suite.session import MAX_SEQ, Session, missing, outcomes_of, read_outcome
+from conformance.vectors import question, wire_data
 from scene import Collision, Outcome, Scene, State, to_data
 from scene.protocol.messages import Introduction
 
@@ -129,17 +130,6 @@ class Implementation:
         return found
 
 
-def question(
-    cmd: str, scene: Scene | Mapping[str, Any], start: State | Sequence[State], t_end: float, n: int = 1
-) -> dict[str, Any]:
-    """Return a request, all but its seq."""
-    starts = [start] if isinstance(start, State) else list(start)
-    place = {"states": starts} if cmd == "flow" else {"state": starts[0]}
-    more = {"trajectory": {"collisions": n}, "time": {"collisions": n, "repeat": 1}}.get(cmd, {})
-    end = {} if cmd == "time" else {"t_end": t_end}
-    return {"cmd": cmd, "scene": _data(scene), **msgspec.to_builtins(place), **more, **end}
-
-
 def octaves(draw: Draw, low: float, high: float) -> Iterator[float]:
     """Draw one number from each octave of [low, high], log-uniform, the highest first."""
     while high > low:
@@ -197,16 +187,12 @@ def _draw_asked(
     lacking = "" if profile in offered.profiles else f"profile {profile}"
     for i in range(0 if lacking else MAX_DRAWN):
         asked = list(check.asks(Draw(f"{seed}/{check.name}/{profile}/{i}"), profile))
-        needs = [missing(offered, profile, _data(one[0])) for one in asked]
+        needs = [missing(offered, profile, wire_data(one[0])) for one in asked]
         fitting += [one for one, need in zip(asked, needs, strict=True) if not need]
         lacking = next(filter(None, needs), lacking)
         if 2 * len(fitting) >= len(asked):
             break
     return fitting, lacking
-
-
-def _data(scene: Scene | Mapping[str, Any]) -> Mapping[str, Any]:
-    return scene if isinstance(scene, Mapping) else to_data(scene)
 
 
 def as_pytest(check: SuiteCheck, profile: str, asked: Question) -> str:

@@ -24,10 +24,11 @@ from msgspec.structs import replace
 
 from conformance.cases import scenes
 from conformance.cases.draw import Draw, wire_form
-from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
+from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from conformance.suite.checks.paths import distance, draw_start, is_same_capture
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import outcomes_of, read_outcome, with_walls
+from conformance.vectors import question
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import TableAt, table_at
 from scene.protocol.messages import json_schema

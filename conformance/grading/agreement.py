@@ -166,6 +166,8 @@ def compare(
     state: State,
     bound: float | None = None,
     physics: Fraction = BOUND,
+    *,
+    is_end: bool = False,
 ) -> Agreement:
     """Compare an answer with the truth.
 
@@ -175,6 +177,7 @@ def compare(
         state: the start.
         bound: backward ulps allowed in every component; None where physics is all that is asked.
         physics: backward error allowed, of vectors.
+        is_end: whether only the last certified step is answered, as by a flow.
 
     Returns:
         What differs first, with the worst errors of the numbers where they were compared.
@@ -184,10 +187,11 @@ def compare(
         is_undecided = any(isinstance(step, Undecided) for step in answers)
         return Agreement("undecided" if is_undecided else "indeterminate", why="the proof is undecided")
     measured: list[_Measured] = []
-    for i, (certified, time) in enumerate(zip(expected.steps, _times(expected, state), strict=True)):
+    due = list(zip(expected.steps, _times(expected, state), strict=True))[-1 if is_end else 0 :]
+    for i, (certified, time) in enumerate(due):
         place = f"step {i + 1}: " if isinstance(answer, list) else ""
         if i >= len(answers):
-            return Agreement("length", why=f"{place}missing, {i} of {len(expected.steps)} were given", step=i)
+            return Agreement("length", why=f"{place}missing, {i} of {len(due)} were given", step=i)
         if differing := _difference(answers[i], certified):
             return differing._replace(why=(place + differing.why)[:200], step=i)
         measured.append(_measure(answers[i], certified, time, place, physics))
@@ -195,8 +199,8 @@ def compare(
             hint = _missed(answers[i], certified)
             judged = _judge_numbers(measured, bound, physics)
             return judged._replace(why=judged.why + hint, step=i)
-    end = _judge_end(expected, answers[len(expected.steps) :])
-    return end._replace(step=len(expected.steps)) if end else _judge_numbers(measured, bound, physics)
+    end = _judge_end(expected, answers[len(due) :])
+    return end._replace(step=len(due)) if end else _judge_numbers(measured, bound, physics)
 
 
 def compare_arrival(
@@ -218,14 +222,8 @@ def compare_arrival(
     Returns:
         As `compare`; `numbers` too where a stay is missing, invented, or begins or ends at a wrong time.
     """
-    times = list(_times(expected, state))
-    if expected.outcome != "horizon":
-        return _judge_end(expected, [answer]) or _judge_numbers([], None, physics)
-    if differing := _difference(answer, expected.steps[-1]):
-        return differing
-    measured = _measure(answer, expected.steps[-1], times[-1], "", physics)
-    judged = _judge_numbers([measured], None, physics)
-    if judged.kind != "agrees":
+    judged = compare(answer, expected, state, physics=physics, is_end=True)
+    if judged.kind != "agrees" or expected.outcome != "horizon":
         return judged
     if (captured is None) != (not expected.stays):
         said = "none" if captured is None else f"a capture interval from {captured[0]!r} to {captured[1]!r}"
@@ -233,6 +231,7 @@ def compare_arrival(
         return judged._replace(kind="numbers", why=f"captured: {said}, must be {first}")
     if captured is None:
         return judged
+    times = list(_times(expected, state))
     for name, end, place in zip(("begin", "end"), captured, expected.stays[0], strict=True):
         (low, high), allowance = times[place]
         error = max(Fraction(end) - high, low - Fraction(end), Fraction(0))

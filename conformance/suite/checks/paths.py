@@ -23,7 +23,6 @@ from msgspec.structs import replace
 from conformance import plain
 from conformance.cases import scenes
 from conformance.cases.draw import Draw, leaves, readable, wire_form
-from conformance.plain.step import CaptureInterval
 from conformance.properties import BOUND, SLACK
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from conformance.suite.session import read_outcome
@@ -43,7 +42,7 @@ from scene import (
 from scene.geometry import half_width, table_at
 from scene.laws import bounds, is_constant
 from scene.tables import laws
-from scene.transforms import scaled
+from scene.transforms import scaled, scaled_state
 
 FINE, COARSE = 2.0**-36, SLACK * BOUND  # of sizes
 FLIGHT = 2.0**-48  # of sizes: a straight flight, of a stepper that is fine
@@ -231,20 +230,18 @@ def first_capture(
         hits: its collisions up to t_end.
         t_end: [time].
     """
-    stay = CaptureInterval()
-    vx, vy = start.vx, start.vy
+    path = plain.PlainPath(scene, start, t_end)
     for hit in hits:
         assert isinstance(hit, Collision)
-        if hit.wall == "arc":
-            reach = float(half_width(fp, scene, hit.t)) * hypot(vx, vy)
-            spin = abs(hit.x * vy - hit.y * vx)
-            if abs(spin - reach) <= ON_EDGE * reach:
-                return UNCLEAR
-            stay = stay.after(hit.t, spin > reach)
-        elif hit.wall != "base" and stay.begin is not None:
-            return stay.until(hit.t)
-        vx, vy = hit.vx, hit.vy
-    return stay.until(t_end)
+        vx, vy = path.state.vx, path.state.vy
+        reach = float(half_width(fp, scene, hit.t)) * hypot(vx, vy)
+        spin = abs(hit.x * vy - hit.y * vx)
+        if hit.wall == "arc" and not path.stays and abs(spin - reach) <= ON_EDGE * reach:
+            return UNCLEAR
+        path.watch(hit)
+        path.state = hit.state()
+    path.close(t_end)
+    return path.stays[0] if path.stays else None
 
 
 def follow(side: Implementation, scene: Scene, state: State, n: int, t_end: float = FOREVER) -> bool:
@@ -352,9 +349,7 @@ def edges(draw: Draw, profile: str) -> Iterator[Question]:
         for make in (aimed, through_the_mouth, through_the_mouth, slanted, along_the_arc, nearly_captured):
             scene, state, n = make(draw, near)
             k, j = draw.pick(range(-20, 21)), draw.pick(range(-20, 21))
-            unit, clock = 2.0**k, 2.0**j
-            x, y, vx, vy = state.x * unit, state.y * unit, state.vx * unit / clock, state.vy * unit / clock
-            yield scaled(scene, k, j), State(state.t * clock, x, y, vx, vy, state.wall), n
+            yield scaled(scene, k, j), scaled_state(state, k, j), n
 
 
 def _table(draw: Draw, w: float, h: Any = None) -> Mushroom:

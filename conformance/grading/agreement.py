@@ -127,21 +127,14 @@ class Agreement(NamedTuple):
         return VERDICTS[self.kind]
 
 
-class _Measured(NamedTuple):
-    """Bounds of an error over the enclosures.
+class _Error(NamedTuple):
+    """Bounds of the backward error of one component over the enclosures."""
 
-    Attributes:
-        where: the first component that is wrong, for what is computed later follows from it; of a right
-            answer the worst.
-        off: the backward error of that component.
-    """
-
+    where: str
     least: Fraction | float
     most: Fraction | float
     least_ulps: Fraction | float
     most_ulps: Fraction | float
-    where: str
-    off: Fraction | float
 
 
 def backward_ulps(error: Fraction, size: Fraction) -> Fraction | float:
@@ -186,7 +179,7 @@ def compare(
     if expected is None:
         is_undecided = any(isinstance(step, Undecided) for step in answers)
         return Agreement("undecided" if is_undecided else "indeterminate", why="the proof is undecided")
-    measured: list[_Measured] = []
+    measured: list[_Error] = []
     due = list(zip(expected.steps, _times(expected, state), strict=True))[-1 if is_end else 0 :]
     for i, (certified, time) in enumerate(due):
         place = f"step {i + 1}: " if isinstance(answer, list) else ""
@@ -194,8 +187,9 @@ def compare(
             return Agreement("length", why=f"{place}missing, {i} of {len(due)} were given", step=i)
         if differing := _difference(answers[i], certified):
             return differing._replace(why=(place + differing.why)[:200], step=i)
-        measured.append(_measure(answers[i], certified, time, place, physics))
-        if measured[-1].least > physics:
+        errors = _measure(answers[i], certified, time, place)
+        measured += errors
+        if any(error.least > physics for error in errors):
             hint = _missed(answers[i], certified)
             judged = _judge_numbers(measured, bound, physics)
             return judged._replace(why=judged.why + hint, step=i)
@@ -314,18 +308,21 @@ def _name(answer: Answer) -> str:
     return type(answer).__name__.lower()
 
 
-def _judge_numbers(measured: Sequence[_Measured], bound: float | None, physics: Fraction) -> Agreement:
-    """Judge the numbers of an answer whose outcomes and walls are right."""
+def _judge_numbers(measured: Sequence[_Error], bound: float | None, physics: Fraction) -> Agreement:
+    """Judge the numbers of an answer whose outcomes and walls are right.
+
+    Of wrong ones the first is named: what is computed later follows from it.
+    """
     if not measured:
         return Agreement("agrees", why="the right outcome")
-    worst = max(measured, key=lambda found: found.most)
-    last = measured[-1]
-    ulps = _rounded(max(found.most_ulps for found in measured))
+    worst = max(measured, key=lambda error: error.most)
+    ulps = _rounded(max(error.most_ulps for error in measured))
     found = Agreement("agrees", ulps, _rounded(worst.most), f"{ulps:.3g} backward ulps")
-    if last.least > physics:
-        off = f"{last.where} is off by {_rounded(last.off):.3g} (backward)"
-        return found._replace(kind="numbers", why=off)
-    if bound is not None and any(step.least_ulps > bound for step in measured):
+    for error in measured:
+        if error.least > physics:
+            off = f"{error.where} is off by {_rounded(error.most):.3g} (backward)"
+            return found._replace(kind="numbers", why=off)
+    if bound is not None and any(error.least_ulps > bound for error in measured):
         return found._replace(kind="numbers", why=f"numbers are off by {ulps:.3g} backward ulps")
     if worst.most > physics or (bound is not None and ulps > bound):
         return found._replace(kind="indeterminate", why=f"{worst.where} is enclosed too widely")
@@ -343,39 +340,28 @@ def _times(expected: Expectation, state: State) -> Iterator[tuple[Ends, Fraction
         yield (low, high), allowance
 
 
-def _measure(
-    answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str, physics: Fraction
-) -> _Measured:
+def _measure(answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str) -> list[_Error]:
     """Measure dt (of a horizon none is given), t (but of an enclosed answer), place and velocity."""
     numbers = _numbers_of(answer)
     if not all(math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)):
-        return _Measured(
-            math.inf, math.inf, math.inf, math.inf, f"{place}a number that is not finite", math.inf
-        )
+        return [_Error(f"{place}a number that is not finite", *[math.inf] * 4)]
     answered = {name: (Fraction(low), Fraction(high)) for name, (low, high) in numbers.items()}
     truth = {name: certified.ends(name) for name in NUMBERS} | {"t": time[0]}
     allowances = dict(zip(NUMBERS, map(Fraction, certified.allowance), strict=True)) | {"t": time[1]}
     sizes = {name: allowances[name] + max(map(abs, ends)) for name, ends in answered.items()}
-    found = _Measured(Fraction(0), Fraction(-1), Fraction(0), Fraction(0), "", Fraction(0))
+    found = []
     for vector in VECTORS:
-        scale = max([LEAST / U, *(sizes[name] for name in vector if name in answered)])
-        for name in (name for name in vector if name in answered):
+        names = [name for name in vector if name in answered]
+        scale = max([LEAST / U, *(sizes[name] for name in names)])
+        for name in names:
             (low, high), (certified_low, certified_high) = answered[name], truth[name]
             most = max(abs(high - certified_low), abs(certified_high - low))
             least = max(certified_low - high, low - certified_high, Fraction(0))
             # An exact zero that nothing can move, as y on the base, has no size of its own to be measured by.
             is_zero = not allowances[name] and not any(truth[name])
             size = scale if is_zero else sizes[name]
-            off = most / scale
-            is_named = found.most <= physics and off > found.most
-            found = _Measured(
-                max(found.least, least / scale),
-                max(found.most, off),
-                max(found.least_ulps, backward_ulps(least, size)),
-                max(found.most_ulps, backward_ulps(most, size)),
-                place + name if is_named else found.where,
-                off if is_named else found.off,
-            )
+            ulps = backward_ulps(least, size), backward_ulps(most, size)
+            found.append(_Error(place + name, least / scale, most / scale, *ulps))
     return found
 
 

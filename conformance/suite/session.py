@@ -239,20 +239,22 @@ class Session(AbstractContextManager["Session"]):
         return failure
 
 
-def missing(introduction: Introduction, profile: str, scene: Mapping[str, Any] | None) -> str:
+def missing(introduction: Introduction | None, profile: str, scene: Mapping[str, Any] | None) -> str:
     """Say what a question needs that an implementation does not list; empty when it lists all.
 
     Args:
-        introduction: what it said of itself.
+        introduction: what it said of itself, once opened.
         profile: step, trajectory, flow or time.
         scene: as for `needs`.
     """
-    offered = {"profile": introduction.profiles, "table": introduction.tables, "law": introduction.laws}
-    return ", ".join(f"{what} {name}" for what, name in needs(profile, scene) if name not in offered[what])
+    lacking = [
+        (part, name) for part, name in needs(profile, scene) if name not in getattr(introduction, part)
+    ]
+    return ", ".join(f"{part.removesuffix('s')} {name}" for part, name in lacking)
 
 
 def needs(profile: str, scene: Mapping[str, Any] | None) -> list[tuple[str, str]]:
-    """Return what a question needs: its profile, its table and the kinds of its laws.
+    """Return what a question needs of `profiles`, `tables` and `laws`: each with the name in an introduction.
 
     Args:
         profile: step, trajectory, flow or time.
@@ -260,10 +262,11 @@ def needs(profile: str, scene: Mapping[str, Any] | None) -> list[tuple[str, str]
             table and no law is needed.
     """
     if scene is None:
-        return [("profile", profile)]
+        return [("profiles", profile)]
     parts = {name: part for name, part in scene.items() if name not in ("table", "name", "notes")}
     kinds = {law["kind"] if isinstance(law, Mapping) else "constant" for law in parts.values()}
-    return [("profile", profile), ("table", str(scene["table"])), *(("law", kind) for kind in sorted(kinds))]
+    found = [("profiles", profile), ("tables", str(scene["table"]))]
+    return [*found, *(("laws", kind) for kind in sorted(kinds))]
 
 
 def probe_values() -> list[float]:

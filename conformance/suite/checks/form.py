@@ -76,7 +76,6 @@ class Implementation:
         Raises:
             CheckFailure: unsupported, when it offers none.
         """
-        assert self.session.introduction is not None
         for profile in profiles:
             if not missing(self.session.introduction, profile, to_data(scene)):
                 return Implementation(self.session, profile)
@@ -139,7 +138,6 @@ def octaves(draw: Draw, low: float, high: float) -> Iterator[float]:
 
 def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
     """Ask all that a check draws from a seed, of every profile that is offered, up to the first fault."""
-    assert session.introduction is not None
     begin, lacking = time.monotonic(), ""
     notes: list[str] = []
     n = n_compared = n_declined = n_open = n_asked = 0
@@ -180,11 +178,11 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
 
 
 def _draw_asked(
-    check: SuiteCheck, offered: Introduction, profile: str, seed: int
+    check: SuiteCheck, offered: Introduction | None, profile: str, seed: int
 ) -> tuple[list[Question], str]:
     """Return the questions that may be asked, drawn anew while too few are, and what the others need."""
     fitting: list[Question] = []
-    lacking = "" if profile in offered.profiles else f"profile {profile}"
+    lacking = missing(offered, profile, None)
     for i in range(0 if lacking else MAX_DRAWN):
         asked = list(check.asks(Draw(f"{seed}/{check.name}/{profile}/{i}"), profile))
         needs = [missing(offered, profile, wire_data(one[0])) for one in asked]

@@ -40,7 +40,7 @@ from scene import (
     Undecided,
 )
 from scene.geometry import half_width, table_at
-from scene.laws import bounds, is_constant
+from scene.laws import bounds
 from scene.tables import laws
 from scene.transforms import scaled, scaled_state
 
@@ -142,7 +142,7 @@ def _first_flaw(
     }
     bad = {why: int(np.argmax(where)) for why, where in flaws.items() if where.any()}
     if not bad:
-        return _not_kept(scene, start, after)
+        return ""
     why = min(bad, key=lambda name: bad[name])
     return f"outcome {bad[why] + 1} {why}"
 
@@ -202,21 +202,6 @@ def _beyond(scene: Scene, before: Any, dt: Any, walls: Any, end: tuple[Any, Any]
         out = np.maximum(out, np.where(crosses, np.abs(x0 + vx0 * s) - w, -1.0))
         out = np.maximum(out, np.where(on_base, w - np.abs(x[:, -1:]), -1.0))
     return (out / table.size).max(axis=1)
-
-
-def _not_kept(scene: Scene, start: State, after: Any) -> str:
-    """Say what a table at rest does not keep: speed, and in a cap the size of the spin."""
-    if not all(is_constant(law) for law in laws(scene).values()):
-        return ""
-    _, x, y, vx, vy = after
-    speed = hypot(start.vx, start.vy)
-    if (np.abs(np.hypot(vx, vy) - speed) > SLACK * BOUND * speed).any():
-        return "has another speed than at the start, in a table at rest"
-    spin = abs(start.x * start.vy - start.y * start.vx)
-    allowed = SLACK * BOUND * float(table_at(fp, scene, start.t).size) * speed
-    if isinstance(scene, Cap) and (np.abs(np.abs(x * vy - y * vx) - spin) > allowed).any():
-        return "has another |x vy - y vx| than at the start, in a cap at rest"
-    return ""
 
 
 def first_capture(

@@ -18,7 +18,7 @@ from conformance.cases.certify import claimed_path, judge, proved_step
 from conformance.cases.draw import Family, Proved, Question, file_vector
 from conformance.grading.agreement import compare
 from conformance.vectors import Expectation
-from scene import Outcome, Rejected, Scene, State, Undecided, from_data
+from scene import Outcome, Rejected, Scene, State, from_data
 from scene.states import Stepper
 
 KINDS = ("agreed", "undecided", "refused", "open", "wrong")
@@ -164,14 +164,11 @@ def confirmed(attack: Question) -> Judgement:
 
 def stepped(outcome: Outcome, claim: Expectation | None, state: State) -> Judgement:
     """Judge one step in binary64: the same outcome within some backward ulps, or an honest undecided."""
-    if isinstance(outcome, Undecided):
-        return Judgement("undecided", outcome.reason)
-    if claim is None:
-        return Judgement("open", "no claim is proved")
-    if isinstance(outcome, Rejected):
+    if isinstance(outcome, Rejected) and claim is not None:
         return Judgement("refused")
     found = compare(outcome, claim, state, BOUND)
-    kind = {"agrees": "agreed", "indeterminate": "open"}.get(found.kind, "wrong")
+    kinds = {"agrees": "agreed", "indeterminate": "open", "undecided": "undecided"}
+    kind = kinds.get(found.kind, "wrong")
     return Judgement(kind, found.why, found.ulps)
 
 

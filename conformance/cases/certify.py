@@ -252,7 +252,7 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
         path = reference.trajectory(
             scene, state, question.collisions, t_end, working=working, is_differentiated=True
         )
-        captured = marks(scene, path.steps) if question.is_flow else []
+        marks = [mark(scene, step) for step in path.steps] if question.is_flow else []
     except InvalidState as error:
         raise Unfit(str(error)) from None
     end = path.outcome
@@ -271,7 +271,7 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     if any(map(_is_wide, steps)):
         return proved_path(scene, question, 2 * path.digits)
     if question.is_flow:
-        arrived = arrival(steps, capture_intervals(captured))
+        arrived = arrival(steps, capture_intervals(marks))
         largest = max(links.condition, timing_condition(arrived, state))
         if largest > question.longest:
             raise Unfit("the horizon is too delicate")
@@ -352,21 +352,17 @@ def _is_wide(step: Certified) -> bool:
     return False
 
 
-def marks(scene: Scene, steps: Sequence[reference.Collision]) -> list[Mark]:
-    """Return what each collision of a proved path means for capture intervals.
+def mark(scene: Scene, step: reference.Collision) -> Mark:
+    """Return what a collision of a proved path means for capture intervals.
 
     Raises:
         Unfit: an arc hit is neither proved captured nor proved not to be.
     """
-    found: list[Mark] = []
-    for step in steps:
-        if step.wall in ("left", "right", "floor"):
-            found.append("out")
-        elif step.wall == "arc" and isinstance(scene, Mushroom):
-            found.append("captured" if _is_captured(scene, step) else "free")
-        else:
-            found.append("")
-    return found
+    if step.wall in ("left", "right", "floor"):
+        return "out"
+    if step.wall == "arc" and isinstance(scene, Mushroom):
+        return "captured" if _is_captured(scene, step) else "free"
+    return ""
 
 
 def capture_intervals(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
@@ -507,7 +503,7 @@ def _walls_met(scene: Scene, vector: Vector, state: State) -> list[str]:
         return [outcome.wall if isinstance(outcome, reference.Collision) else type(outcome).__name__]
     try:
         path = reference.trajectory(scene, state, vector.collisions, vector.t_end, digits=10)
-        found = marks(scene, path.steps) if vector.kind == "flow" else []
+        marks = [mark(scene, step) for step in path.steps] if vector.kind == "flow" else []
     except (InvalidState, Unfit):
         return ["Rejected"]
-    return [*(step.wall for step in path.steps), *found, type(path.outcome).__name__]
+    return [*(step.wall for step in path.steps), *marks, type(path.outcome).__name__]

@@ -303,9 +303,7 @@ def _judge_end(expected: Expectation, rest: Sequence[Answer]) -> Agreement | Non
 def _name(answer: Answer) -> str:
     if isinstance(answer, Enclosed):
         return "collision" if answer.wall else "horizon"
-    if isinstance(answer, AnsweredCollision):
-        return "collision"
-    return type(answer).__name__.lower()
+    return str(answer.__struct_config__.tag)
 
 
 def _judge_numbers(measured: Sequence[_Error], bound: float | None, physics: Fraction) -> Agreement:

@@ -280,7 +280,6 @@ def probe_values() -> list[float]:
 
 
 UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
-MAX_OFFERED = 100  # profiles, tables or laws that an introduction may list
 ANSWERS = {"step": Answered, "trajectory": Steps, "flow": Flown, "time": Timed}
 
 
@@ -308,8 +307,9 @@ def read_introduction(line: bytes) -> Introduction:
             "wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}"
         )
     texts = {name: clean(getattr(introduction, name)) for name in ("name", "version", "language")}
-    lists = {name: getattr(introduction, name)[:MAX_OFFERED] for name in ("profiles", "tables", "laws")}
-    offered = {name: tuple(map(clean, words)) for name, words in lists.items()}
+    offered = {
+        name: tuple(map(clean, getattr(introduction, name))) for name in ("profiles", "tables", "laws")
+    }
     return msgspec.structs.replace(introduction, **texts, **offered)
 
 

@@ -30,7 +30,7 @@ def moments(draw: Draw, profile: str, *, is_idle: bool = False) -> Iterator[Ques
     With `is_idle` the tables are at rest, and their constants are written as laws.
     """
     for _ in range(N_SYMMETRIES):
-        scene, state = paths.draw_start(draw, kinds=("fourier", "bang-bang", "constant"))
+        scene, state = paths.draw_start(draw)
         scene = transforms.idle(transforms.frozen(scene, state.t)) if is_idle else scene
         span = paths.crossing(scene, state)
         yield scene, state, state.t + span * (draw.between(0.25, 2.0) if profile == "flow" else 16.0)

@@ -65,9 +65,7 @@ class Implementation:
         """Return one outcome: of a step, of a trajectory of one collision, or of a flow of one state."""
         if not all(math.isfinite(number) for number in (*msgspec.structs.astuple(state)[:5], t_end)):
             raise CheckFailure("fail", f"its answers lead to the state {state} and t_end = {t_end}")
-        part, *more = self.parts(question(self.profile, scene, state, t_end))
-        if more:
-            raise CheckFailure("wrong-format", f"{1 + len(more)} outcomes are answered to one question")
+        (part,) = self.parts(question(self.profile, scene, state, t_end), 1)
         return read_outcome(part, state.t)
 
     def by(self, *profiles: str, scene: Scene) -> "Implementation":
@@ -81,14 +79,24 @@ class Implementation:
                 return Implementation(self.session, profile)
         raise CheckFailure("unsupported", f"profile {' or '.join(profiles)}")
 
-    def parts(self, request: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Ask, and return and count the outcomes that are answered; a whole refusal is the only one."""
+    def parts(self, request: Mapping[str, Any], n_due: int | None = None) -> list[dict[str, Any]]:
+        """Ask, and return and count the outcomes that are answered; a whole refusal is the only one.
+
+        Args:
+            request: all but its seq.
+            n_due: how many outcomes answer it; None where that depends.
+
+        Raises:
+            CheckFailure: also error, and wrong-format for another number of outcomes.
+        """
         answer = self.session.ask(request)
         if "error" in answer:
             raise CheckFailure("error", answer["error"])
         found = outcomes_of(answer)
         self.n_asked += len(found)
         self.n_undecided += sum(part["outcome"] == "undecided" for part in found)
+        if n_due not in (None, len(found)):
+            raise CheckFailure("wrong-format", f"{n_due} outcomes are due, answered are {found}"[:200])
         return found
 
     def said(self, line: str) -> dict[str, Any]:
@@ -118,15 +126,8 @@ class Implementation:
         return found
 
     def flown(self, scene: Scene, states: Sequence[State], t_end: float) -> list[dict[str, Any]]:
-        """Carry states to t_end, and return what is answered for each.
-
-        Raises:
-            CheckFailure: also wrong-format, for another number of states.
-        """
-        found = self.parts(question("flow", scene, states, t_end)) if states else []
-        if len(found) != len(states):
-            raise CheckFailure("wrong-format", f"a flow of {len(states)} states is answered {found}"[:200])
-        return found
+        """Carry states to t_end, and return what is answered for each."""
+        return self.parts(question("flow", scene, states, t_end), len(states))
 
 
 def octaves(draw: Draw, low: float, high: float) -> Iterator[float]:

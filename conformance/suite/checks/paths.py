@@ -12,7 +12,7 @@ a tolerance, as the vectors let pass, to COARSE.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import hypot
 from typing import Any
 
@@ -294,6 +294,23 @@ def distance(scene: Scene, a: Outcome, b: Outcome) -> float:
     )
     found = max(gap / extent if extent else (math.inf if gap else 0.0) for gap, extent in parts)
     return math.inf if math.isnan(found) else found
+
+
+def answered_distance(
+    scene: Scene, one: Mapping[str, Any], other: Mapping[str, Any], t: float, span: float = math.inf
+) -> float:
+    """Return how far two answered outcomes are apart, as `distance`; infinite for other capture intervals.
+
+    Args:
+        scene: of both.
+        one: an outcome as it is answered.
+        other: likewise.
+        t: when the flight began.
+        span: of time, by which capture intervals are measured.
+    """
+    if not is_same_capture(one.get("captured"), other.get("captured"), span):
+        return math.inf
+    return distance(scene, read_outcome(one, t), read_outcome(other, t))
 
 
 def is_same_capture(a: Sequence[float] | None, b: Sequence[float] | None, span: float) -> bool:

@@ -167,8 +167,8 @@ def stepped(outcome: Outcome, claim: Expectation | None, state: State) -> Judgem
     if isinstance(outcome, Rejected) and claim is not None:
         return Judgement("refused")
     found = compare(outcome, claim, state, BOUND)
-    kinds = {"agrees": "agreed", "indeterminate": "open", "undecided": "undecided"}
-    kind = kinds.get(found.kind, "wrong")
+    kinds = {"pass": "agreed", "indeterminate": "open", "declined": "undecided"}
+    kind = kinds.get(found.verdict, "wrong")
     return Judgement(kind, found.why, found.ulps)
 
 

@@ -57,29 +57,7 @@ LOST = ("undefined", "undecided", "rejected")  # may be answered to a whole ques
 SHARP, FAIR = 4.0, 1e4  # backward ulps of classes A and B
 # Of several right answers the best grade counts; this is the order.
 _PREFERENCE = ("pass", "indeterminate", "declined", "fail")
-Kind = Literal[
-    "agrees",
-    "numbers",
-    "indeterminate",
-    "wall",
-    "outcome",
-    "length",
-    "undecided",
-    "error",
-    "wrong-format",
-]
 Verdict = Literal["pass", "fail", "indeterminate", "declined", "error", "wrong-format"]
-VERDICTS: dict[Kind, Verdict] = {
-    "agrees": "pass",
-    "indeterminate": "indeterminate",
-    "undecided": "declined",
-    "numbers": "fail",
-    "wall": "fail",
-    "outcome": "fail",
-    "length": "fail",
-    "error": "error",
-    "wrong-format": "wrong-format",
-}
 
 
 class Enclosed(NamedTuple):
@@ -106,25 +84,20 @@ class Agreement(NamedTuple):
     """How an answer compares.
 
     Attributes:
-        kind: `agrees`, or what differs first: the `outcome`, the `wall`, the `numbers`, the `length` of a
-            trajectory; `undecided` where the answer is; `indeterminate` where the truth cannot tell; `error`
-            or `wrong-format` where nothing was compared (`grade`).
+        verdict: `pass`, or `fail` where an outcome, a wall, a number or the length of a trajectory differs;
+            `declined` where the answer is undecided; `indeterminate` where the truth cannot tell; `error` or
+            `wrong-format` where nothing was compared (`grade`).
         ulps: worst backward ulps of a component, nan when not measured.
         relative: worst backward error, likewise.
         why: one line.
         step: the one that differs first, counted from 0; of a flow its end, 0.
     """
 
-    kind: Kind
+    verdict: Verdict
     ulps: float = math.nan
     relative: float = math.nan
     why: str = ""
     step: int = 0
-
-    @property
-    def verdict(self) -> Verdict:
-        """Return what the comparison comes to: pass, or why not."""
-        return VERDICTS[self.kind]
 
 
 class _Error(NamedTuple):
@@ -178,13 +151,13 @@ def compare(
     answers = answer if isinstance(answer, list) else [answer]
     if expected is None:
         is_undecided = any(isinstance(step, Undecided) for step in answers)
-        return Agreement("undecided" if is_undecided else "indeterminate", why="the proof is undecided")
+        return Agreement("declined" if is_undecided else "indeterminate", why="the proof is undecided")
     measured: list[_Error] = []
     due = list(zip(expected.steps, _times(expected, state), strict=True))[-1 if is_end else 0 :]
     for i, (certified, time) in enumerate(due):
         place = f"step {i + 1}: " if isinstance(answer, list) else ""
         if i >= len(answers):
-            return Agreement("length", why=f"{place}missing, {i} of {len(due)} were given", step=i)
+            return Agreement("fail", why=f"{place}missing, {i} of {len(due)} were given", step=i)
         if differing := _difference(answers[i], certified):
             return differing._replace(why=(place + differing.why)[:200], step=i)
         errors = _measure(answers[i], certified, time, place)
@@ -217,12 +190,12 @@ def compare_arrival(
         As `compare`; `numbers` too where a stay is missing, invented, or begins or ends at a wrong time.
     """
     judged = compare(answer, expected, state, physics=physics, is_end=True)
-    if judged.kind != "agrees" or expected.outcome != "horizon":
+    if judged.verdict != "pass" or expected.outcome != "horizon":
         return judged
     if (captured is None) != (not expected.stays):
         said = "none" if captured is None else f"a capture interval from {captured[0]!r} to {captured[1]!r}"
         first = f"the capture interval {expected.stays[0]} of its steps" if expected.stays else "none"
-        return judged._replace(kind="numbers", why=f"captured: {said}, must be {first}")
+        return judged._replace(verdict="fail", why=f"captured: {said}, must be {first}")
     if captured is None:
         return judged
     times = list(_times(expected, state))
@@ -231,7 +204,7 @@ def compare_arrival(
         error = max(Fraction(end) - high, low - Fraction(end), Fraction(0))
         if error > physics * (allowance + abs(Fraction(end))):
             why = f"captured: its {name} is {end!r}, must be {float(low)!r} (step {place + 1})"
-            return judged._replace(kind="numbers", why=why)
+            return judged._replace(verdict="fail", why=why)
     return judged
 
 
@@ -258,15 +231,15 @@ def middle(expected: Expectation, state: State) -> list[Outcome]:
 def _difference(answer: Answer, certified: Certified) -> Agreement | None:
     """Return how an answer differs in outcome or wall; None when it does not."""
     if isinstance(answer, Undecided):
-        return Agreement("undecided", why=f"undecided: {answer.reason}")
+        return Agreement("declined", why=f"undecided: {answer.reason}")
     due = certified.wall or "horizon"
     if isinstance(answer, Rejected | Undefined):
-        return Agreement("outcome", why=f"{_name(answer)}, must be {due}: {answer.reason}")
+        return Agreement("fail", why=f"{_name(answer)}, must be {due}: {answer.reason}")
     met = None if isinstance(answer, Horizon) else answer.wall
     if met == certified.wall:
         return None
     why = f"{met or 'horizon'}, must be {due}{_missed(answer, certified)}"
-    return Agreement("wall" if met and certified.wall else "outcome", why=why)
+    return Agreement("fail", why=why)
 
 
 def _missed(answer: Answer, certified: Certified) -> str:
@@ -290,14 +263,14 @@ def _missed(answer: Answer, certified: Certified) -> str:
 def _judge_end(expected: Expectation, rest: Sequence[Answer]) -> Agreement | None:
     """Judge what follows the certified steps; None when it is right."""
     if expected.outcome in ("collision", "horizon"):
-        return Agreement("length", why=f"{len(rest)} steps too many") if rest else None
+        return Agreement("fail", why=f"{len(rest)} steps too many") if rest else None
     if not rest:
-        return Agreement("length", why=f"must end as {expected.outcome}")
+        return Agreement("fail", why=f"must end as {expected.outcome}")
     kind, due = _name(rest[0]), f"{expected.outcome} {expected.reason}".rstrip()
     said = f"undefined {rest[0].reason}" if isinstance(rest[0], Undefined) else kind
     if said == due or kind == expected.outcome != "undefined":
         return None
-    return Agreement("undecided" if kind == "undecided" else "outcome", why=f"{said}, must be {due}")
+    return Agreement("declined" if kind == "undecided" else "fail", why=f"{said}, must be {due}")
 
 
 def _name(answer: Answer) -> str:
@@ -312,18 +285,18 @@ def _judge_numbers(measured: Sequence[_Error], bound: float | None, physics: Fra
     Of wrong ones the first is named: what is computed later follows from it.
     """
     if not measured:
-        return Agreement("agrees", why="the right outcome")
+        return Agreement("pass", why="the right outcome")
     worst = max(measured, key=lambda error: error.most)
     ulps = _rounded(max(error.most_ulps for error in measured))
-    found = Agreement("agrees", ulps, _rounded(worst.most), f"{ulps:.3g} backward ulps")
+    found = Agreement("pass", ulps, _rounded(worst.most), f"{ulps:.3g} backward ulps")
     for error in measured:
         if error.least > physics:
             off = f"{error.where} is off by {_rounded(error.most):.3g} (backward)"
-            return found._replace(kind="numbers", why=off)
+            return found._replace(verdict="fail", why=off)
     if bound is not None and any(error.least_ulps > bound for error in measured):
-        return found._replace(kind="numbers", why=f"numbers are off by {ulps:.3g} backward ulps")
+        return found._replace(verdict="fail", why=f"numbers are off by {ulps:.3g} backward ulps")
     if worst.most > physics or (bound is not None and ulps > bound):
-        return found._replace(kind="indeterminate", why=f"{worst.where} is enclosed too widely")
+        return found._replace(verdict="indeterminate", why=f"{worst.where} is enclosed too widely")
     return found
 
 
@@ -409,7 +382,7 @@ def grade(vector: Vector, answer: Any) -> Agreement:
         none = f"the walls alone are graded: condition {vector.condition:.1g} allows no number"
         graded = graded._replace(why=none)
     if graded.verdict == "declined" and {"rejected"} < {known.outcome for known in vector.expect}:
-        graded = graded._replace(kind="agrees", why=f"{graded.why}; a refusal is allowed here")
+        graded = graded._replace(verdict="pass", why=f"{graded.why}; a refusal is allowed here")
     if any(isinstance(outcome, AnsweredCollision) and outcome.dt is None for outcome in outcomes):
         return graded._replace(why=f"{graded.why}; without dt, t is graded in its place")
     return graded

@@ -105,7 +105,7 @@ def by_command(
         limits: of the session.
 
     Raises:
-        CommandNotFound: there is no such program.
+        BadInput: there is no such program.
         CheckFailure: it does not introduce itself.
     """
     session = stack.enter_context(Session(command, limits))

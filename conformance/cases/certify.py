@@ -24,6 +24,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 import numpy.typing as npt
+from msgspec.structs import astuple
 
 import reference
 from conformance.cases.draw import Proved, Question, Unfit, file_vector
@@ -118,8 +119,8 @@ def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> St
     """
     place, speed = max(abs(state.x), abs(state.y)), max(abs(state.vx), abs(state.vy))
     sizes = (abs(state.t), place, place, speed, speed)
-    values = [v + nudge * sign * size for v, sign, size in zip(inputs_of(state), signs, sizes, strict=True)]
-    t, x, y, vx, vy = values
+    numbers = astuple(state)[:5]
+    t, x, y, vx, vy = (v + nudge * sign * size for v, sign, size in zip(numbers, signs, sizes, strict=True))
     return State(min(t, t_end), x, y, vx, vy, state.wall)
 
 
@@ -141,11 +142,6 @@ def coasted(outcome: reference.Horizon, since: Ends) -> dict[str, Ends]:
 
 def _numbers(dt: Ends, after: reference.Moment) -> dict[str, Ends]:
     return {"dt": dt, **{name: ends(getattr(after, name)) for name in NUMBERS[1:]}}
-
-
-def inputs_of(state: State) -> list[float]:
-    """Return the five numbers that a step starts from: t, x, y, vx, vy."""
-    return [state.t, state.x, state.y, state.vx, state.vy]
 
 
 def free_flight(state: State, dt: float) -> Matrix:
@@ -212,7 +208,7 @@ class Links:
     def _chain(self, jacobian: Matrix, numbers: dict[str, Ends]) -> list[float]:
         centre = [float(sum(numbers[name]) / 2) for name in NUMBERS]
         self.held = np.concatenate([self.held, np.eye(5)[None]])
-        self.inputs = np.concatenate([self.inputs, [inputs_of(self.state)]])
+        self.inputs = np.concatenate([self.inputs, [astuple(self.state)[:5]]])
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused by `finite`
             rows = (np.array(jacobian)[:, :, None] * self.held[:, None]).sum(axis=2)
             moved = np.abs(rows * self.inputs[:, None]).sum(axis=(0, 2))

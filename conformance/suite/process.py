@@ -136,10 +136,6 @@ class CheckFailure(Exception):  # noqa: N818 (a finding about the stepper)
         super().__init__(f"{verdict}: {self.why}")
 
 
-class CommandNotFound(BadInput):
-    """The command cannot be started: one line naming it and the reason."""
-
-
 class Transcript:
     """The first and the last part of a stream, bounded."""
 
@@ -168,7 +164,7 @@ class Process:
         stderr: where its standard error is kept.
 
     Raises:
-        CommandNotFound: when the program cannot be started.
+        BadInput: when the program cannot be started.
     """
 
     def __init__(self, command: Sequence[str], stderr: Transcript) -> None:
@@ -185,7 +181,7 @@ class Process:
         except (OSError, ValueError) as error:
             self._descendants.follow(0)
             reason = error.strerror if isinstance(error, OSError) else str(error)
-            raise CommandNotFound(f"command {command[0]!r} cannot be started: {reason}") from None
+            raise BadInput(f"command {command[0]!r} cannot be started: {reason}") from None
         self._descendants.follow(self._child.pid)
         stdin, stdout, stderr_pipe = self._child.stdin, self._child.stdout, self._child.stderr
         assert stdin is not None and stdout is not None and stderr_pipe is not None  # noqa: PT018

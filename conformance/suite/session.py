@@ -124,7 +124,7 @@ class Session(AbstractContextManager["Session"]):
         """Start the process and exchange introductions.
 
         Raises:
-            CommandNotFound: when there is no such program.
+            BadInput: when there is no such program.
             CheckFailure: when it does not introduce itself in protocol 1; the session is then over.
         """
         self._process = (

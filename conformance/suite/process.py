@@ -21,7 +21,6 @@ meanwhile in a session of its own would be taken for one of the command's.
 
 import contextlib
 import ctypes
-import errno
 import os
 import selectors
 import signal
@@ -270,7 +269,10 @@ class Process:
 
     def _advance(self, pending: bytes, timeout: float) -> bytes:
         # Write what a pipe takes, and look at all pipes once; returns what is still to be written.
-        pending = self._write(pending) if pending else pending
+        try:
+            pending = pending[self._stdin.write(pending) or 0 :] if pending else b""
+        except (BrokenPipeError, ConnectionResetError):
+            pending = b""  # it no longer reads: its silence or its exit will tell
         if pending:
             self._selector.register(self._stdin, selectors.EVENT_WRITE)
         for key, _ in self._selector.select(timeout):
@@ -287,14 +289,6 @@ class Process:
         if pending:
             self._selector.unregister(self._stdin)
         return pending
-
-    def _write(self, pending: bytes) -> bytes:
-        try:
-            return pending[self._stdin.write(pending) or 0 :]
-        except OSError as error:
-            if error.errno not in (errno.EPIPE, errno.ECONNRESET):
-                raise
-            return b""  # it no longer reads: its silence or its exit will tell
 
     def _is_readable(self) -> bool:
         return any(key.fileobj is self._stdout for key, _ in self._selector.select(0.0))

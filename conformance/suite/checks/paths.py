@@ -89,8 +89,6 @@ def flaw_of(scene: Scene, start: State, path: Sequence[Outcome], errors: Errors)
     if not ends:
         return ""
     rows = np.array([[at.t, at.x, at.y, at.vx, at.vy] for at in (start, *ends)], dtype=float)
-    if not np.isfinite(rows).all():
-        return "has a number that is none"
     before, after = rows[:-1].T, rows[1:].T
     dt = np.array([getattr(at, "dt", at.t - t) for at, t in zip(ends, rows[:-1, 0], strict=True)])
     walls = np.array([getattr(at, "wall", "") for at in ends])

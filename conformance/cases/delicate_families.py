@@ -8,6 +8,7 @@ parts of what is left of it.
 """
 
 import math
+from typing import Any
 
 import msgspec
 from mpmath import MPContext
@@ -128,13 +129,11 @@ def knot_at_event(draw: Draw) -> Question:
         r=draw.short(0.6, 1.5), w=draw.short(0.1, 0.4), h=draw.short(0.3, 2.0), slope=draw.short(-0.2, 0.004)
     )
     start, _ = state(draw, of, {"t": 0.0, "site": draw.pick(("cap", "stem")), "speed": 0.25})
-    before = [start, *plain.trajectory(of, start, 3, NEVER)]
+    before: list[Any] = [start, *plain.trajectory(of, start, 3, NEVER)]
     n, known = draw.pick((1, 1, 2, 3)), laws(of)
     if not all(isinstance(hit, State | Collision) for hit in before) or len(before) <= n:
         raise Unfit("no such hit")
     last, hit = before[n - 1 : n + 1]
-    assert isinstance(hit, Collision)
-    assert isinstance(last, State | Collision)
     name, time = {"arc": "r", "floor": "h", "base": "w"}.get(hit.wall, draw.pick(("w", "slope"))), hit.t
     if hit.wall != "base" and last.y * hit.y < 0 and draw.pick((True, False)):
         name, time = "w", last.t - last.y / last.vy

@@ -56,8 +56,7 @@ class Descendants:
         self._leader = 0
         if not self._leaders:
             mine = os.getpid()
-            self._before.clear()
-            self._before.update((entry.pid, entry.born) for entry in _table() if entry.parent == mine)
+            Descendants._before = {(entry.pid, entry.born) for entry in _table() if entry.parent == mine}
         _adopt_orphans(True)
 
     def follow(self, leader: int) -> None:
@@ -260,8 +259,7 @@ class Process:
             self._child.wait()
         self._selector.close()
         for stream in (self._stdin, self._stdout, self._stderr):
-            with contextlib.suppress(OSError):
-                stream.close()
+            stream.close()
 
     def _check_silence(self) -> None:
         if self._received:

@@ -131,9 +131,11 @@ class Transform(NamedTuple):
             return [self.restore(part, exponent) for part in answer]
         if not isinstance(answer, dict):
             return answer * 2.0**exponent if exponent and isinstance(answer, int | float) else answer
-        exponents = dict.fromkeys(("dt", "t", "captured"), -self.time)
-        exponents |= dict.fromkeys(("x", "y"), -self.length)
-        exponents |= dict.fromkeys(("vx", "vy"), self.time - self.length)
+        exponents = {
+            **dict.fromkeys(("dt", "t", "captured"), -self.time),
+            **dict.fromkeys(("x", "y"), -self.length),
+            **dict.fromkeys(("vx", "vy"), self.time - self.length),
+        }
         found = {name: self.restore(part, exponents.get(name, 0)) for name, part in answer.items()}
         if self.is_mirrored:
             found |= {name: -found[name] for name in ("x", "vx") if isinstance(found.get(name), float)}

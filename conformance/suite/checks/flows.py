@@ -117,13 +117,12 @@ def arrive(side: Implementation, scene: Scene, begin: float, end: float) -> bool
     """
     low, high = {Cap: (0.0, 1.0), Stem: (-1.25, 0.0), Mushroom: (-0.5, 0.5)}[type(scene)]
     length, fold = high - low, end % 2.0
-    is_back, t_end = fold > 1.0, end - begin
+    t_end, end_speed = end - begin, -length if fold > 1.0 else length
     at, to = low + length * begin, low + length * min(fold, 2.0 - fold)
-    speed, to_speed = length, -length if is_back else length
     if isinstance(scene, Mushroom):
-        start, due = State(0.0, at, -0.5, speed, 0.0), Horizon(t_end, to, -0.5, to_speed, 0.0)
+        start, due = State(0.0, at, -0.5, length, 0.0), Horizon(t_end, to, -0.5, end_speed, 0.0)
     else:
-        start, due = State(0.0, 0.0, at, 0.0, speed), Horizon(t_end, 0.0, to, 0.0, to_speed)
+        start, due = State(0.0, 0.0, at, 0.0, length), Horizon(t_end, 0.0, to, 0.0, end_speed)
     (found,) = side.flown(scene, [start], t_end)
     arrival = read_outcome(found)
     if isinstance(arrival, Undecided):

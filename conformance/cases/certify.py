@@ -57,7 +57,7 @@ from scene import (
 )
 
 # What a level asks (docs/corpus.md): nudges that change no wall, and the largest condition number.
-NUDGES: tuple[tuple[Level, float], ...] = (("core", 2.0**-30), ("extended", 2.0**-44))
+NUDGES: dict[Level, float] = {"core": 2.0**-30, "extended": 2.0**-44}
 CONDITIONS = {"core": 1e6, "extended": 1e12}
 # Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
 SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
@@ -483,7 +483,7 @@ def _level(scene: Scene | None, vector: Vector) -> Level:
         return "stress"
     expected = _walls_met(scene, vector, vector.state)
     patterns = SIGNS if vector.kind == "step" else SIGNS[:2]
-    for level, nudge in NUDGES:
+    for level, nudge in NUDGES.items():
         states = (nudged(vector.state, vector.t_end, signs, nudge) for signs in patterns)
         if vector.condition <= CONDITIONS[level] and all(
             _walls_met(scene, vector, state) == expected for state in states

@@ -15,7 +15,7 @@ from mpmath import MPContext
 
 from conformance import plain
 from conformance.cases.draw import NEVER, Draw, Family, Question, Unfit
-from conformance.cases.scenes import TABLES, Clock, clock, many_legs, off_its_wall, scene, state
+from conformance.cases.scenes import SIDES, TABLES, Clock, clock, many_legs, off_its_wall, scene, state
 from scene import BangBang, Cap, Collision, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.laws import value
 from scene.tables import laws
@@ -26,7 +26,6 @@ FINE.prec = 300  # bits, of the place of a wall
 SPEEDS = (-2.0, -1.0, -0.75, -0.1, 0.0, 0.1, 0.25, 1.0, 3.0)
 PERIOD = 4.0
 ARRIVALS = (0.5, 1.0, 2.0)  # flight times
-SIDES: tuple[Wall, ...] = ("left", "right")
 LARGEST = 390  # powers of two, of units of length and time
 
 

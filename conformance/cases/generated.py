@@ -28,7 +28,6 @@ FRESH = "fresh"
 KINDS: tuple[Kind, ...] = ("step", "step", "step", "step", "trajectory", "flow")
 HITS = 1, 2, 3, 4, 5  # of trajectories and flows
 ROUND = sum(family.weight for family in FAMILIES.values())  # questions
-NUDGE = dict(NUDGES)
 
 
 def fresh_one(seed: int, number: int) -> Vector:
@@ -121,7 +120,7 @@ def _is_steady(of: Scene, question: Question) -> bool:
 
     start, t_end = question.state, question.t_end
     expected = met(start)
-    nudge = NUDGE[_delicacy(of, start)]
+    nudge = NUDGES[_delicacy(of, start)]
     return all(met(nudged(start, t_end, signs, nudge)) == expected for signs in SIGNS)
 
 

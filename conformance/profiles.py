@@ -267,11 +267,16 @@ def _span(scene: Scene, alarm: float) -> float:
 
 def check_work_identity(flow: Flowing, scene: Scene, *, n_particles: int, kT: float, seed: int = 0) -> None:
     """Raise AssertionError, with one line, if `work_identity` fails or too many particles are lost."""
-    for finding in work_identity(flow, scene, n_particles=n_particles, kT=kT, seed=seed):
-        if not finding.is_met:
-            raise AssertionError(f"work identity: {finding}")
-        if finding.is_depleted:
-            raise AssertionError(f"work identity: {finding}: at most {MAX_LOST:.0%} may be lost")
+    require(work_identity(flow, scene, n_particles=n_particles, kT=kT, seed=seed))
+
+
+def require(findings: Sequence[Statistic]) -> None:
+    """Raise AssertionError, with one line, if a mean is not met or too many particles are lost."""
+    why = "; ".join(map(str, findings))
+    if not all(finding.is_met for finding in findings):
+        raise AssertionError(why)
+    if any(finding.is_depleted for finding in findings):
+        raise AssertionError(f"{why}: at most {MAX_LOST:.0%} may be lost")
 
 
 def margin(n: int, variance: float, bound: float, alarm: float) -> float:

@@ -40,6 +40,7 @@ import msgspec
 from mpmath import fp
 
 from conformance import plain
+from conformance.vectors import question
 from scene import (
     Collision,
     Horizon,
@@ -49,7 +50,6 @@ from scene import (
     State,
     Undecided,
     Undefined,
-    to_data,
     transforms,
 )
 from scene.geometry import table_at
@@ -292,11 +292,10 @@ def check_symplectic(
     if coarse is None or fine is None:
         return False
     M = [[(4 * b - a) / 3 for a, b in zip(*rows, strict=True)] for rows in zip(coarse, fine, strict=True)]
-    entries = [abs(m) for row in M for m in row]
     gap = max(abs(a - b) for rows in zip(coarse, fine, strict=True) for a, b in zip(*rows, strict=True))
     # The time of the hit is rounded like t, whatever the stepper.
     noise = bound + 2.0**-50 * max(abs(begin.t), abs(end)) / time
-    largest = max(entries)
+    largest = max(abs(m) for row in M for m in row)
     allowed = 16 * largest * gap + SLACK * largest * largest * noise / STEP
     for i in range(4):
         for j in range(i):
@@ -385,15 +384,14 @@ def _compare(
     state = question[1]
     if isinstance(answer, Undecided) or isinstance(expected, Undecided):
         return False
-    is_same_kind = type(answer) is type(expected)
-    is_same = is_same_kind and getattr(answer, "wall", None) == getattr(expected, "wall", None)
+    walls = [getattr(outcome, "wall", None) for outcome in (answer, expected)]
     allowed: Sequence[float] = (0.0,) * 6
     if not is_exact:
         step = measure_step(stepper, *question, bound, incoming)
         if step is None:
             return False
         allowed = [2 * error for error in step.errors]
-    if not is_same:
+    if type(answer) is not type(expected) or walls[0] != walls[1]:
         fail(name, f"{answer}, must be {expected}", question, image)
     found, wanted = numbers(answer, state), numbers(expected, state)
     if found is None or wanted is None:
@@ -417,10 +415,7 @@ def fail(name: str, text: str, *questions: Question) -> NoReturn:
     Raises:
         AssertionError: always.
     """
-    lines = []
-    for scene, state, t_end in questions:
-        asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
-        lines.append(json.dumps({"cmd": "step", "seq": 1, **asked}))
+    lines = [json.dumps({"cmd": "step", "seq": 1, **question("step", *asked)}) for asked in questions]
     raise AssertionError("; ".join([f"{name}: {text}", *lines]))
 
 
@@ -453,8 +448,7 @@ def ask(stepper: Stepper, scene: Scene, state: State, t_end: float) -> Outcome:
     if isinstance(found, Collision) and found.wall not in scene.walls:
         text = f"wall = {shown(found.wall)}, must be one of {', '.join(scene.walls)}"
         fail("outcome", text, (scene, state, t_end))
-    fields = [field for field in found.__struct_fields__ if field != "wall"]
-    numbers = {field: _number(getattr(found, field)) for field in fields}
+    numbers = {field: _number(getattr(found, field)) for field in found.__struct_fields__ if field != "wall"}
     for field, number in numbers.items():
         if not math.isfinite(number):
             text = f"{field} = {shown(getattr(found, field))}, must be a finite number"

@@ -19,7 +19,8 @@ from conformance.cases import scenes as scene_draws
 from conformance.cases.draw import Draw, Question, Unfit
 from conformance.cases.scenes import Clock, any_law, any_scene, start, when
 from conformance.cases.table import FAMILIES
-from scene import BadInput, Horizon, Law, Scene, State, from_data, to_data
+from conformance.vectors import question
+from scene import BadInput, Horizon, Law, Scene, State, from_data
 from scene.transforms import scaled
 
 KINDS = ("constant", "fourier", "bang-bang", "mixed")
@@ -111,8 +112,7 @@ def states(draw: st.DrawFn, scene: Scene) -> tuple[State, float]:
 def _tell(scene: Scene, state: State, t_end: float) -> None:
     """Print a failing example as a line of the protocol."""
     if currently_in_test_context():
-        asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
-        note(json.dumps({"cmd": "step", "seq": 1, **asked}))
+        note(json.dumps({"cmd": "step", "seq": 1, **question("step", scene, state, t_end)}))
 
 
 @st.composite

@@ -39,7 +39,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from scene import BadInput, Outcome, Rejected, Scene, State, Wall, from_data
+from scene import BadInput, Outcome, Rejected, Scene, State, Wall, from_data, to_data
 from scene.protocol.wire import Flowing
 from scene.states import Stepper
 
@@ -269,14 +269,33 @@ def request(vector: Vector, seq: int) -> dict[str, Any]:
         vector: the question.
         seq: number of the request.
     """
-    state = msgspec.structs.asdict(vector.state)
-    asked = {"cmd": vector.kind, "seq": seq, "scene": vector.scene}
-    if vector.kind == "flow":
-        return {**asked, "states": [state], "t_end": vector.t_end}
-    asked["state"] = state
-    if vector.kind == "trajectory":
-        asked["collisions"] = vector.collisions
-    return {**asked, "t_end": vector.t_end}
+    asked = question(vector.kind, vector.scene, vector.state, vector.t_end, vector.collisions)
+    return {"cmd": vector.kind, "seq": seq, **asked}
+
+
+def question(
+    cmd: str, scene: Scene | Mapping[str, Any], start: State | Sequence[State], t_end: float, n: int = 1
+) -> dict[str, Any]:
+    """Return a request of the protocol, all but its seq.
+
+    Args:
+        cmd: step, trajectory, flow or time.
+        scene: a scene, or its data in the form of the protocol.
+        start: the state; of a flow one or several.
+        t_end: horizon [time]; a `time` request has none.
+        n: number of collisions, of a trajectory or a `time` request.
+    """
+    starts = [start] if isinstance(start, State) else start
+    states = [msgspec.structs.asdict(state) for state in starts]
+    place: dict[str, Any] = {"states": states} if cmd == "flow" else {"state": states[0]}
+    more = {"trajectory": {"collisions": n}, "time": {"collisions": n, "repeat": 1}}.get(cmd, {})
+    end = {} if cmd == "time" else {"t_end": t_end}
+    return {"cmd": cmd, "scene": wire_data(scene), **place, **more, **end}
+
+
+def wire_data(scene: Scene | Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the data of a scene in the form of the protocol, or such data as they are."""
+    return scene if isinstance(scene, Mapping) else to_data(scene)
 
 
 @lru_cache(maxsize=4096)

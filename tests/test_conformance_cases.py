@@ -27,7 +27,7 @@ from conformance.cases.certify import (
     capture_intervals,
     certify,
     claimed_path,
-    marks,
+    mark,
     proved_step,
 )
 from conformance.cases.draw import Question, Unfit
@@ -278,7 +278,7 @@ CHORD = Question(STATIC, State(0.0, 0.5, 0.25, 0.0, 1.0), 0.75, 40, True)
     [
         lambda: certify(TOUCHING._replace(group="touch"), 1),
         lambda: certify(CHORD._replace(group="edge"), 1),
-        lambda: marks(STATIC, reference.trajectory(STATIC, CHORD.state, 1, 9.0).steps),
+        lambda: mark(STATIC, reference.trajectory(STATIC, CHORD.state, 1, 9.0).steps[0]),
     ],
 )
 def test_what_has_no_answer_makes_no_vector(call):

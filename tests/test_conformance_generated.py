@@ -30,7 +30,6 @@ from conformance.cases.generated import (
     _is_steady,
     certified_draw,
     family_of,
-    fresh,
     fresh_one,
 )
 from conformance.cases.scenes import many_legs, walls_speed
@@ -263,7 +262,7 @@ DEALT = [name for name, family in FAMILIES.items() if family.weight]
 
 @cache
 def asked_in_a_run(seed, n=ROUND):
-    return list(fresh(seed, n))
+    return [fresh_one(seed, number) for number in range(1, n + 1)]
 
 
 @cache

@@ -67,9 +67,9 @@ def test_it_agrees_with_the_reference(name, tally):
             tally[answer.wall] += 1
         worst = max(worst, found.ulps)
         # A place on the side of a stem far narrower than the way there is known to the rounding of that way.
-        is_rounding = name == "plain" and found.kind == "numbers" and found.relative <= 2.0**-50
-        assert found.kind in ("agrees", "undecided") or truth is None or is_rounding, (found, answer)
-        assert found.kind == "agrees" or name == "plain" or is_delicate(*drawn), answer
+        is_rounding = name == "plain" and found.verdict == "fail" and found.relative <= 2.0**-50
+        assert found.verdict in ("pass", "declined") or truth is None or is_rounding, (found, answer)
+        assert found.verdict == "pass" or name == "plain" or is_delicate(*drawn), answer
 
     step()
     tally["worst backward ulps (thousandths)"] = round(1000 * worst)
@@ -88,16 +88,16 @@ def off(c, dt=1.0, **changes):
 
 # What is told in place of the right answer up to t_end, how it compares, and how an attack judges it.
 SPOILT = {
-    "right": (10.0, lambda c: c, "agrees", "agreed"),
-    "right horizon": (0.11, lambda c: c, "agrees", "agreed"),
-    "another wall": (10.0, lambda c: off(c, wall="floor"), "wall", "wrong"),
-    "time": (10.0, lambda c: off(c, 1 + 1e-13), "numbers", "wrong"),
-    "velocity": (10.0, lambda c: off(c, vy=-c.vy), "numbers", "wrong"),
-    "nan": (10.0, lambda c: off(c, vx=float("nan")), "numbers", "wrong"),
-    "place at the horizon": (0.11, lambda c: msgspec.structs.replace(c, x=c.x + 1e-9), "numbers", "wrong"),
-    "a horizon": (10.0, lambda c: Horizon(c.t, c.x, c.y, c.vx, c.vy), "outcome", "wrong"),
-    "none": (10.0, lambda c: Undecided("shy"), "undecided", "undecided"),
-    "a refusal": (10.0, lambda c: Rejected("no"), "outcome", "refused"),
+    "right": (10.0, lambda c: c, "pass", "agreed"),
+    "right horizon": (0.11, lambda c: c, "pass", "agreed"),
+    "another wall": (10.0, lambda c: off(c, wall="floor"), "fail", "wrong"),
+    "time": (10.0, lambda c: off(c, 1 + 1e-13), "fail", "wrong"),
+    "velocity": (10.0, lambda c: off(c, vy=-c.vy), "fail", "wrong"),
+    "nan": (10.0, lambda c: off(c, vx=float("nan")), "fail", "wrong"),
+    "place at the horizon": (0.11, lambda c: msgspec.structs.replace(c, x=c.x + 1e-9), "fail", "wrong"),
+    "a horizon": (10.0, lambda c: Horizon(c.t, c.x, c.y, c.vx, c.vy), "fail", "wrong"),
+    "none": (10.0, lambda c: Undecided("shy"), "declined", "undecided"),
+    "a refusal": (10.0, lambda c: Rejected("no"), "fail", "refused"),
 }
 
 
@@ -106,7 +106,7 @@ def test_comparison_catches_spoilt_answers(name):
     t_end, spoil, compared, judged = SPOILT[name]
     truth = proved_step(SCENE, STATE, t_end)
     (right,) = middle(truth, STATE)
-    assert compare(spoil(right), truth, STATE, BOUND).kind == compared
+    assert compare(spoil(right), truth, STATE, BOUND).verdict == compared
     assert stepped(spoil(right), truth, STATE).kind == judged
     assert stepped(right, None, STATE).kind == "open"
 
@@ -138,21 +138,21 @@ def test_an_enclosed_answer_and_a_wide_truth():
     truth = proved_step(SCENE, STATE, 10.0, 40)
     (step,) = truth.steps
     ends = [step.ends(name) for name in NUMBERS]
-    assert compare(Enclosed(step.wall, ends), truth, STATE, BOUND).kind == "agrees"
+    assert compare(Enclosed(step.wall, ends), truth, STATE, BOUND).verdict == "pass"
     off = [
         (low, high) if i else (high + high / 10**20, high + high / 10**19)
         for i, (low, high) in enumerate(ends)
     ]
     found = compare(Enclosed(step.wall, off), truth, STATE, 0.0)
-    assert (found.kind, 0 < found.ulps < 1) == ("numbers", True)
+    assert (found.verdict, 0 < found.ulps < 1) == ("fail", True)
     (right,) = middle(truth, STATE)
     low, high = step.ends("x")
     wide = certified(
         {**dict(zip(NUMBERS, ends, strict=True)), "x": (low, high + 1)}, step.allowance, step.wall
     )
-    assert compare(right, Expectation("collision", (wide,)), STATE).kind == "indeterminate"
-    assert compare(right, None, STATE, BOUND).kind == "indeterminate"
-    assert compare(Undecided("shy"), None, STATE, BOUND).kind == "undecided"
+    assert compare(right, Expectation("collision", (wide,)), STATE).verdict == "indeterminate"
+    assert compare(right, None, STATE, BOUND).verdict == "indeterminate"
+    assert compare(Undecided("shy"), None, STATE, BOUND).verdict == "declined"
 
 
 CTX = MPContext()

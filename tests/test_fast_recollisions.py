@@ -90,8 +90,8 @@ def wrong_answers(questions):
             proved_step(scene, state, state.t + 5.0),
             state,
             4.0,
-        ).kind
-        != "agrees"
+        ).verdict
+        != "pass"
     ]
 
 

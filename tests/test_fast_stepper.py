@@ -215,7 +215,7 @@ def test_what_was_wrong_once_is_right(name):
     truth = proved_step(scene, state, t_end)
     assert truth.outcome in ("collision", "horizon")
     found = compare(fast.next_collision(scene, state, t_end), truth, state, 4.0)
-    assert found.kind == "agrees", found
+    assert found.verdict == "pass", found
 
 
 def test_an_arc_that_dips_below_zero_and_comes_back_on_the_way_to_the_base():

@@ -105,7 +105,7 @@ def by_command(
         limits: of the session.
 
     Raises:
-        CommandNotFound: there is no such program.
+        BadInput: there is no such program.
         CheckFailure: it does not introduce itself.
     """
     session = stack.enter_context(Session(command, limits))
@@ -255,7 +255,7 @@ def _grade(found: SolverAnswer, question: ProvedStep) -> tuple[str, float, float
         return "left", 0.0, 0.0
     answer = _enclosed(found)
     agreement = compare(answer, question.truth, question.state)
-    if agreement.kind == "undecided":
+    if agreement.verdict == "declined":
         return "undecided", 0.0, 0.0
     if math.isnan(agreement.ulps) or not isinstance(answer, Enclosed):
         return "wrong", 0.0, 0.0

@@ -16,14 +16,13 @@ import msgspec
 
 from conformance.cases.certify import claimed_path, judge, proved_step
 from conformance.cases.draw import Family, Proved, Question, file_vector
-from conformance.grading.agreement import compare
+from conformance.grading.agreement import SHARP, compare
 from conformance.vectors import Expectation
-from scene import Outcome, Rejected, Scene, State, Undecided, from_data
+from scene import Outcome, Rejected, Scene, State, from_data
 from scene.states import Stepper
 
 KINDS = ("agreed", "undecided", "refused", "open", "wrong")
 LISTED = ("undecided", "open", "wrong")
-BOUND = 4.0  # backward ulps: the sharpest class of grades
 Flow = Callable[[Scene, State, float], "dict[str, int] | None"]  # None: undecided
 
 
@@ -164,14 +163,11 @@ def confirmed(attack: Question) -> Judgement:
 
 def stepped(outcome: Outcome, claim: Expectation | None, state: State) -> Judgement:
     """Judge one step in binary64: the same outcome within some backward ulps, or an honest undecided."""
-    if isinstance(outcome, Undecided):
-        return Judgement("undecided", outcome.reason)
-    if claim is None:
-        return Judgement("open", "no claim is proved")
-    if isinstance(outcome, Rejected):
+    if isinstance(outcome, Rejected) and claim is not None:
         return Judgement("refused")
-    found = compare(outcome, claim, state, BOUND)
-    kind = {"agrees": "agreed", "indeterminate": "open"}.get(found.kind, "wrong")
+    found = compare(outcome, claim, state, SHARP)
+    kinds = {"pass": "agreed", "indeterminate": "open", "declined": "undecided"}
+    kind = kinds.get(found.verdict, "wrong")
     return Judgement(kind, found.why, found.ulps)
 
 

@@ -132,17 +132,13 @@ def _asked(data: dict[str, Any]) -> Question:
     return question_of(written)._replace(level=None)
 
 
-def file_of(vector: Vector) -> str:
-    """Return the name of a vector's file."""
-    return ("hard-cases" if vector.group.startswith("hard-case-") else vector.group) + ".jsonl"
-
-
 def write(folder: Path, vectors: Iterable[Vector]) -> Manifest:
     """Write vectors, by file, and their manifest, each complete or not at all; the manifest last."""
     folder.mkdir(parents=True, exist_ok=True)
     files, entries = defaultdict[str, list[Vector]](list), {}
     for vector in vectors:
-        files[file_of(vector)].append(vector)
+        name = "hard-cases" if vector.group.startswith("hard-case-") else vector.group
+        files[f"{name}.jsonl"].append(vector)
     for name, held in sorted(files.items()):
         data = encode(held)
         write_file(folder / name, data)

@@ -8,13 +8,14 @@ parts of what is left of it.
 """
 
 import math
+from typing import Any
 
 import msgspec
 from mpmath import MPContext
 
 from conformance import plain
 from conformance.cases.draw import NEVER, Draw, Family, Question, Unfit
-from conformance.cases.scenes import TABLES, Clock, clock, many_legs, off_its_wall, scene, state
+from conformance.cases.scenes import SIDES, TABLES, Clock, clock, many_legs, off_its_wall, scene, state
 from scene import BangBang, Cap, Collision, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.laws import value
 from scene.tables import laws
@@ -25,7 +26,6 @@ FINE.prec = 300  # bits, of the place of a wall
 SPEEDS = (-2.0, -1.0, -0.75, -0.1, 0.0, 0.1, 0.25, 1.0, 3.0)
 PERIOD = 4.0
 ARRIVALS = (0.5, 1.0, 2.0)  # flight times
-SIDES: tuple[Wall, ...] = ("left", "right")
 LARGEST = 390  # powers of two, of units of length and time
 
 
@@ -128,13 +128,11 @@ def knot_at_event(draw: Draw) -> Question:
         r=draw.short(0.6, 1.5), w=draw.short(0.1, 0.4), h=draw.short(0.3, 2.0), slope=draw.short(-0.2, 0.004)
     )
     start, _ = state(draw, of, {"t": 0.0, "site": draw.pick(("cap", "stem")), "speed": 0.25})
-    before = [start, *plain.trajectory(of, start, 3, NEVER)]
+    before: list[Any] = [start, *plain.trajectory(of, start, 3, NEVER)]
     n, known = draw.pick((1, 1, 2, 3)), laws(of)
     if not all(isinstance(hit, State | Collision) for hit in before) or len(before) <= n:
         raise Unfit("no such hit")
     last, hit = before[n - 1 : n + 1]
-    assert isinstance(hit, Collision)
-    assert isinstance(last, State | Collision)
     name, time = {"arc": "r", "floor": "h", "base": "w"}.get(hit.wall, draw.pick(("w", "slope"))), hit.t
     if hit.wall != "base" and last.y * hit.y < 0 and draw.pick((True, False)):
         name, time = "w", last.t - last.y / last.vy

@@ -12,8 +12,6 @@ less than x: these than level extended. All are filed as of level core. The plai
 are asked: those that meet the wall that is looked for, and keep it when nudged.
 """
 
-from collections.abc import Iterator
-from functools import cache
 from math import inf
 from typing import Any
 
@@ -30,41 +28,23 @@ FRESH = "fresh"
 KINDS: tuple[Kind, ...] = ("step", "step", "step", "step", "trajectory", "flow")
 HITS = 1, 2, 3, 4, 5  # of trajectories and flows
 ROUND = sum(family.weight for family in FAMILIES.values())  # questions
-NUDGE = dict(NUDGES)
 
 
-def fresh(seed: int, n: int) -> Iterator[Vector]:
-    """Draw questions and prove their answers, each when it is asked for.
-
-    Args:
-        seed: of the run.
-        n: how many.
-
-    Yields:
-        `fresh/1` to `fresh/n`, filed as of level core, though the conditions of late ones go up to those of
-        extended; a greater n only adds some.
+def fresh_one(seed: int, number: int) -> Vector:
+    """Draw question `fresh/NUMBER` of a run's seed, and prove its answer.
 
     Raises:
         BadInput: for none of very many draws an answer is proved.
     """
-    return (fresh_one(seed, number) for number in range(1, n + 1))
-
-
-def fresh_one(seed: int, number: int) -> Vector:
-    """Draw and prove one question of `fresh`."""
     return certified_draw(family_of(seed, number), f"{seed}/{FRESH}", number)
 
 
 def family_of(seed: int, number: int) -> Family:
     """Return the row of the table that a question is of."""
-    return _dealt(seed, (number - 1) // ROUND)[(number - 1) % ROUND]
-
-
-@cache
-def _dealt(seed: int, number: int) -> list[Family]:
+    n_rounds, place = divmod(number - 1, ROUND)
     rows = [family for family in FAMILIES.values() for _ in range(family.weight)]
-    Draw(f"{seed}/{FRESH}/round/{number}").shuffle(rows)
-    return rows
+    Draw(f"{seed}/{FRESH}/round/{n_rounds}").shuffle(rows)
+    return rows[place]
 
 
 def certified_draw(family: Family, key: str, number: int) -> Vector:
@@ -140,7 +120,7 @@ def _is_steady(of: Scene, question: Question) -> bool:
 
     start, t_end = question.state, question.t_end
     expected = met(start)
-    nudge = NUDGE[_delicacy(of, start)]
+    nudge = NUDGES[_delicacy(of, start)]
     return all(met(nudged(start, t_end, signs, nudge)) == expected for signs in SIGNS)
 
 

@@ -34,6 +34,7 @@ from conformance.cases.scenes import (
     LONGEST,
     MOVING,
     PERIODS,
+    SIDES,
     TABLES,
     Clock,
     any_scene,
@@ -201,7 +202,6 @@ class Term(NamedTuple):
     is_fast: bool = False
 
 
-SIDES: tuple[Wall, ...] = ("left", "right")
 TERMS = {
     "r-rate": Term(("arc",), frozenset({"r"}), is_fast=True),
     "r-bend": Term(("arc",), frozenset({"r"})),
@@ -394,7 +394,7 @@ FAMILIES = (
     ),
     *(
         Family(f"leaning-{wall}", "sides are taken for upright", leaning, weight=4, meets=wall)
-        for wall in ("left", "right")
+        for wall in SIDES
     ),
     *(
         Family(

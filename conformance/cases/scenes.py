@@ -39,6 +39,7 @@ from scene.transforms import scaled_law
 FEW_HARMONICS = ((1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (2, 2), (1, 3))  # of cosines, of sines
 MANY_HARMONICS = ((4, 0), (0, 6), (5, 5), (8, 3), (16, 16))
 TABLES = ("cap", "stem", "mushroom")
+SIDES: tuple[Wall, ...] = ("left", "right")
 MOVING = ("fourier", "bang-bang")
 KINDS = ("constant", "fourier", "bang-bang", "mixed", "mixed", "mixed", "harmonics")
 PERIODS = (0.5, 1.0, 1.5, 4.0)

@@ -57,29 +57,7 @@ LOST = ("undefined", "undecided", "rejected")  # may be answered to a whole ques
 SHARP, FAIR = 4.0, 1e4  # backward ulps of classes A and B
 # Of several right answers the best grade counts; this is the order.
 _PREFERENCE = ("pass", "indeterminate", "declined", "fail")
-Kind = Literal[
-    "agrees",
-    "numbers",
-    "indeterminate",
-    "wall",
-    "outcome",
-    "length",
-    "undecided",
-    "error",
-    "wrong-format",
-]
 Verdict = Literal["pass", "fail", "indeterminate", "declined", "error", "wrong-format"]
-VERDICTS: dict[Kind, Verdict] = {
-    "agrees": "pass",
-    "indeterminate": "indeterminate",
-    "undecided": "declined",
-    "numbers": "fail",
-    "wall": "fail",
-    "outcome": "fail",
-    "length": "fail",
-    "error": "error",
-    "wrong-format": "wrong-format",
-}
 
 
 class Enclosed(NamedTuple):
@@ -106,42 +84,30 @@ class Agreement(NamedTuple):
     """How an answer compares.
 
     Attributes:
-        kind: `agrees`, or what differs first: the `outcome`, the `wall`, the `numbers`, the `length` of a
-            trajectory; `undecided` where the answer is; `indeterminate` where the truth cannot tell; `error`
-            or `wrong-format` where nothing was compared (`grade`).
+        verdict: `pass`, or `fail` where an outcome, a wall, a number or the length of a trajectory differs;
+            `declined` where the answer is undecided; `indeterminate` where the truth cannot tell; `error` or
+            `wrong-format` where nothing was compared (`grade`).
         ulps: worst backward ulps of a component, nan when not measured.
         relative: worst backward error, likewise.
         why: one line.
         step: the one that differs first, counted from 0; of a flow its end, 0.
     """
 
-    kind: Kind
+    verdict: Verdict
     ulps: float = math.nan
     relative: float = math.nan
     why: str = ""
     step: int = 0
 
-    @property
-    def verdict(self) -> Verdict:
-        """Return what the comparison comes to: pass, or why not."""
-        return VERDICTS[self.kind]
 
+class _Error(NamedTuple):
+    """Bounds of the backward error of one component over the enclosures."""
 
-class _Measured(NamedTuple):
-    """Bounds of an error over the enclosures.
-
-    Attributes:
-        where: the first component that is wrong, for what is computed later follows from it; of a right
-            answer the worst.
-        off: the backward error of that component.
-    """
-
+    where: str
     least: Fraction | float
     most: Fraction | float
     least_ulps: Fraction | float
     most_ulps: Fraction | float
-    where: str
-    off: Fraction | float
 
 
 def backward_ulps(error: Fraction, size: Fraction) -> Fraction | float:
@@ -166,6 +132,8 @@ def compare(
     state: State,
     bound: float | None = None,
     physics: Fraction = BOUND,
+    *,
+    is_end: bool = False,
 ) -> Agreement:
     """Compare an answer with the truth.
 
@@ -175,6 +143,7 @@ def compare(
         state: the start.
         bound: backward ulps allowed in every component; None where physics is all that is asked.
         physics: backward error allowed, of vectors.
+        is_end: whether only the last certified step is answered, as by a flow.
 
     Returns:
         What differs first, with the worst errors of the numbers where they were compared.
@@ -182,21 +151,23 @@ def compare(
     answers = answer if isinstance(answer, list) else [answer]
     if expected is None:
         is_undecided = any(isinstance(step, Undecided) for step in answers)
-        return Agreement("undecided" if is_undecided else "indeterminate", why="the proof is undecided")
-    measured: list[_Measured] = []
-    for i, (certified, time) in enumerate(zip(expected.steps, _times(expected, state), strict=True)):
+        return Agreement("declined" if is_undecided else "indeterminate", why="the proof is undecided")
+    measured: list[_Error] = []
+    due = list(zip(expected.steps, _times(expected, state), strict=True))[-1 if is_end else 0 :]
+    for i, (certified, time) in enumerate(due):
         place = f"step {i + 1}: " if isinstance(answer, list) else ""
         if i >= len(answers):
-            return Agreement("length", why=f"{place}missing, {i} of {len(expected.steps)} were given", step=i)
+            return Agreement("fail", why=f"{place}missing, {i} of {len(due)} were given", step=i)
         if differing := _difference(answers[i], certified):
             return differing._replace(why=(place + differing.why)[:200], step=i)
-        measured.append(_measure(answers[i], certified, time, place, physics))
-        if measured[-1].least > physics:
+        errors = _measure(answers[i], certified, time, place)
+        measured += errors
+        if any(error.least > physics for error in errors):
             hint = _missed(answers[i], certified)
             judged = _judge_numbers(measured, bound, physics)
             return judged._replace(why=judged.why + hint, step=i)
-    end = _judge_end(expected, answers[len(expected.steps) :])
-    return end._replace(step=len(expected.steps)) if end else _judge_numbers(measured, bound, physics)
+    end = _judge_end(expected, answers[len(due) :])
+    return end._replace(step=len(due)) if end else _judge_numbers(measured, bound, physics)
 
 
 def compare_arrival(
@@ -218,27 +189,22 @@ def compare_arrival(
     Returns:
         As `compare`; `numbers` too where a stay is missing, invented, or begins or ends at a wrong time.
     """
-    times = list(_times(expected, state))
-    if expected.outcome != "horizon":
-        return _judge_end(expected, [answer]) or _judge_numbers([], None, physics)
-    if differing := _difference(answer, expected.steps[-1]):
-        return differing
-    measured = _measure(answer, expected.steps[-1], times[-1], "", physics)
-    judged = _judge_numbers([measured], None, physics)
-    if judged.kind != "agrees":
+    judged = compare(answer, expected, state, physics=physics, is_end=True)
+    if judged.verdict != "pass" or expected.outcome != "horizon":
         return judged
     if (captured is None) != (not expected.stays):
         said = "none" if captured is None else f"a capture interval from {captured[0]!r} to {captured[1]!r}"
         first = f"the capture interval {expected.stays[0]} of its steps" if expected.stays else "none"
-        return judged._replace(kind="numbers", why=f"captured: {said}, must be {first}")
+        return judged._replace(verdict="fail", why=f"captured: {said}, must be {first}")
     if captured is None:
         return judged
+    times = list(_times(expected, state))
     for name, end, place in zip(("begin", "end"), captured, expected.stays[0], strict=True):
         (low, high), allowance = times[place]
         error = max(Fraction(end) - high, low - Fraction(end), Fraction(0))
         if error > physics * (allowance + abs(Fraction(end))):
             why = f"captured: its {name} is {end!r}, must be {float(low)!r} (step {place + 1})"
-            return judged._replace(kind="numbers", why=why)
+            return judged._replace(verdict="fail", why=why)
     return judged
 
 
@@ -265,15 +231,15 @@ def middle(expected: Expectation, state: State) -> list[Outcome]:
 def _difference(answer: Answer, certified: Certified) -> Agreement | None:
     """Return how an answer differs in outcome or wall; None when it does not."""
     if isinstance(answer, Undecided):
-        return Agreement("undecided", why=f"undecided: {answer.reason}")
+        return Agreement("declined", why=f"undecided: {answer.reason}")
     due = certified.wall or "horizon"
     if isinstance(answer, Rejected | Undefined):
-        return Agreement("outcome", why=f"{_name(answer)}, must be {due}: {answer.reason}")
+        return Agreement("fail", why=f"{_name(answer)}, must be {due}: {answer.reason}")
     met = None if isinstance(answer, Horizon) else answer.wall
     if met == certified.wall:
         return None
     why = f"{met or 'horizon'}, must be {due}{_missed(answer, certified)}"
-    return Agreement("wall" if met and certified.wall else "outcome", why=why)
+    return Agreement("fail", why=why)
 
 
 def _missed(answer: Answer, certified: Certified) -> str:
@@ -297,39 +263,40 @@ def _missed(answer: Answer, certified: Certified) -> str:
 def _judge_end(expected: Expectation, rest: Sequence[Answer]) -> Agreement | None:
     """Judge what follows the certified steps; None when it is right."""
     if expected.outcome in ("collision", "horizon"):
-        return Agreement("length", why=f"{len(rest)} steps too many") if rest else None
+        return Agreement("fail", why=f"{len(rest)} steps too many") if rest else None
     if not rest:
-        return Agreement("length", why=f"must end as {expected.outcome}")
+        return Agreement("fail", why=f"must end as {expected.outcome}")
     kind, due = _name(rest[0]), f"{expected.outcome} {expected.reason}".rstrip()
     said = f"undefined {rest[0].reason}" if isinstance(rest[0], Undefined) else kind
     if said == due or kind == expected.outcome != "undefined":
         return None
-    return Agreement("undecided" if kind == "undecided" else "outcome", why=f"{said}, must be {due}")
+    return Agreement("declined" if kind == "undecided" else "fail", why=f"{said}, must be {due}")
 
 
 def _name(answer: Answer) -> str:
     if isinstance(answer, Enclosed):
         return "collision" if answer.wall else "horizon"
-    if isinstance(answer, AnsweredCollision):
-        return "collision"
-    return type(answer).__name__.lower()
+    return str(answer.__struct_config__.tag)
 
 
-def _judge_numbers(measured: Sequence[_Measured], bound: float | None, physics: Fraction) -> Agreement:
-    """Judge the numbers of an answer whose outcomes and walls are right."""
+def _judge_numbers(measured: Sequence[_Error], bound: float | None, physics: Fraction) -> Agreement:
+    """Judge the numbers of an answer whose outcomes and walls are right.
+
+    Of wrong ones the first is named: what is computed later follows from it.
+    """
     if not measured:
-        return Agreement("agrees", why="the right outcome")
-    worst = max(measured, key=lambda found: found.most)
-    last = measured[-1]
-    ulps = _rounded(max(found.most_ulps for found in measured))
-    found = Agreement("agrees", ulps, _rounded(worst.most), f"{ulps:.3g} backward ulps")
-    if last.least > physics:
-        off = f"{last.where} is off by {_rounded(last.off):.3g} (backward)"
-        return found._replace(kind="numbers", why=off)
-    if bound is not None and any(step.least_ulps > bound for step in measured):
-        return found._replace(kind="numbers", why=f"numbers are off by {ulps:.3g} backward ulps")
+        return Agreement("pass", why="the right outcome")
+    worst = max(measured, key=lambda error: error.most)
+    ulps = _rounded(max(error.most_ulps for error in measured))
+    found = Agreement("pass", ulps, _rounded(worst.most), f"{ulps:.3g} backward ulps")
+    for error in measured:
+        if error.least > physics:
+            off = f"{error.where} is off by {_rounded(error.most):.3g} (backward)"
+            return found._replace(verdict="fail", why=off)
+    if bound is not None and any(error.least_ulps > bound for error in measured):
+        return found._replace(verdict="fail", why=f"numbers are off by {ulps:.3g} backward ulps")
     if worst.most > physics or (bound is not None and ulps > bound):
-        return found._replace(kind="indeterminate", why=f"{worst.where} is enclosed too widely")
+        return found._replace(verdict="indeterminate", why=f"{worst.where} is enclosed too widely")
     return found
 
 
@@ -344,39 +311,28 @@ def _times(expected: Expectation, state: State) -> Iterator[tuple[Ends, Fraction
         yield (low, high), allowance
 
 
-def _measure(
-    answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str, physics: Fraction
-) -> _Measured:
+def _measure(answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str) -> list[_Error]:
     """Measure dt (of a horizon none is given), t (but of an enclosed answer), place and velocity."""
     numbers = _numbers_of(answer)
     if not all(math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)):
-        return _Measured(
-            math.inf, math.inf, math.inf, math.inf, f"{place}a number that is not finite", math.inf
-        )
+        return [_Error(f"{place}a number that is not finite", *[math.inf] * 4)]
     answered = {name: (Fraction(low), Fraction(high)) for name, (low, high) in numbers.items()}
     truth = {name: certified.ends(name) for name in NUMBERS} | {"t": time[0]}
     allowances = dict(zip(NUMBERS, map(Fraction, certified.allowance), strict=True)) | {"t": time[1]}
     sizes = {name: allowances[name] + max(map(abs, ends)) for name, ends in answered.items()}
-    found = _Measured(Fraction(0), Fraction(-1), Fraction(0), Fraction(0), "", Fraction(0))
+    found = []
     for vector in VECTORS:
-        scale = max([LEAST / U, *(sizes[name] for name in vector if name in answered)])
-        for name in (name for name in vector if name in answered):
+        names = [name for name in vector if name in answered]
+        scale = max([LEAST / U, *(sizes[name] for name in names)])
+        for name in names:
             (low, high), (certified_low, certified_high) = answered[name], truth[name]
             most = max(abs(high - certified_low), abs(certified_high - low))
             least = max(certified_low - high, low - certified_high, Fraction(0))
             # An exact zero that nothing can move, as y on the base, has no size of its own to be measured by.
             is_zero = not allowances[name] and not any(truth[name])
             size = scale if is_zero else sizes[name]
-            off = most / scale
-            is_named = found.most <= physics and off > found.most
-            found = _Measured(
-                max(found.least, least / scale),
-                max(found.most, off),
-                max(found.least_ulps, backward_ulps(least, size)),
-                max(found.most_ulps, backward_ulps(most, size)),
-                place + name if is_named else found.where,
-                off if is_named else found.off,
-            )
+            ulps = backward_ulps(least, size), backward_ulps(most, size)
+            found.append(_Error(place + name, least / scale, most / scale, *ulps))
     return found
 
 
@@ -426,7 +382,7 @@ def grade(vector: Vector, answer: Any) -> Agreement:
         none = f"the walls alone are graded: condition {vector.condition:.1g} allows no number"
         graded = graded._replace(why=none)
     if graded.verdict == "declined" and {"rejected"} < {known.outcome for known in vector.expect}:
-        graded = graded._replace(kind="agrees", why=f"{graded.why}; a refusal is allowed here")
+        graded = graded._replace(verdict="pass", why=f"{graded.why}; a refusal is allowed here")
     if any(isinstance(outcome, AnsweredCollision) and outcome.dt is None for outcome in outcomes):
         return graded._replace(why=f"{graded.why}; without dt, t is graded in its place")
     return graded

@@ -21,7 +21,6 @@ meanwhile in a session of its own would be taken for one of the command's.
 
 import contextlib
 import ctypes
-import errno
 import os
 import selectors
 import signal
@@ -57,8 +56,7 @@ class Descendants:
         self._leader = 0
         if not self._leaders:
             mine = os.getpid()
-            self._before.clear()
-            self._before.update((entry.pid, entry.born) for entry in _table() if entry.parent == mine)
+            Descendants._before = {(entry.pid, entry.born) for entry in _table() if entry.parent == mine}
         _adopt_orphans(True)
 
     def follow(self, leader: int) -> None:
@@ -136,10 +134,6 @@ class CheckFailure(Exception):  # noqa: N818 (a finding about the stepper)
         super().__init__(f"{verdict}: {self.why}")
 
 
-class CommandNotFound(BadInput):
-    """The command cannot be started: one line naming it and the reason."""
-
-
 class Transcript:
     """The first and the last part of a stream, bounded."""
 
@@ -168,7 +162,7 @@ class Process:
         stderr: where its standard error is kept.
 
     Raises:
-        CommandNotFound: when the program cannot be started.
+        BadInput: when the program cannot be started.
     """
 
     def __init__(self, command: Sequence[str], stderr: Transcript) -> None:
@@ -185,7 +179,7 @@ class Process:
         except (OSError, ValueError) as error:
             self._descendants.follow(0)
             reason = error.strerror if isinstance(error, OSError) else str(error)
-            raise CommandNotFound(f"command {command[0]!r} cannot be started: {reason}") from None
+            raise BadInput(f"command {command[0]!r} cannot be started: {reason}") from None
         self._descendants.follow(self._child.pid)
         stdin, stdout, stderr_pipe = self._child.stdin, self._child.stdout, self._child.stderr
         assert stdin is not None and stdout is not None and stderr_pipe is not None  # noqa: PT018
@@ -265,8 +259,7 @@ class Process:
             self._child.wait()
         self._selector.close()
         for stream in (self._stdin, self._stdout, self._stderr):
-            with contextlib.suppress(OSError):
-                stream.close()
+            stream.close()
 
     def _check_silence(self) -> None:
         if self._received:
@@ -274,7 +267,10 @@ class Process:
 
     def _advance(self, pending: bytes, timeout: float) -> bytes:
         # Write what a pipe takes, and look at all pipes once; returns what is still to be written.
-        pending = self._write(pending) if pending else pending
+        try:
+            pending = pending[self._stdin.write(pending) or 0 :] if pending else b""
+        except (BrokenPipeError, ConnectionResetError):
+            pending = b""  # it no longer reads: its silence or its exit will tell
         if pending:
             self._selector.register(self._stdin, selectors.EVENT_WRITE)
         for key, _ in self._selector.select(timeout):
@@ -291,14 +287,6 @@ class Process:
         if pending:
             self._selector.unregister(self._stdin)
         return pending
-
-    def _write(self, pending: bytes) -> bytes:
-        try:
-            return pending[self._stdin.write(pending) or 0 :]
-        except OSError as error:
-            if error.errno not in (errno.EPIPE, errno.ECONNRESET):
-                raise
-            return b""  # it no longer reads: its silence or its exit will tell
 
     def _is_readable(self) -> bool:
         return any(key.fileobj is self._stdout for key, _ in self._selector.select(0.0))

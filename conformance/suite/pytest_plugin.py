@@ -9,7 +9,7 @@ import pytest
 
 from conformance import suite, vectors
 from conformance.suite.checks import checks_of
-from conformance.suite.process import CheckFailure, CommandNotFound
+from conformance.suite.process import CheckFailure
 from conformance.suite.run import NEW_SEEDS
 from conformance.suite.session import Limits, Session
 from scene.refusal import BadInput, check_seed
@@ -74,6 +74,6 @@ def mushrooms_session(request: pytest.FixtureRequest) -> Iterator[Session]:
         try:
             session.start()
             session.probe()
-        except (CommandNotFound, CheckFailure) as failure:
+        except (BadInput, CheckFailure) as failure:
             pytest.fail(str(failure), pytrace=False)
         yield session

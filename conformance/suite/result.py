@@ -20,7 +20,7 @@ from scene.protocol.messages import PROFILES, Introduction
 
 TABLES = ("mushroom", "cap", "stem")
 LAWS = ("fourier", "bang-bang", "constant")
-PARTS = {"profiles": ("profile", PROFILES), "tables": ("table", TABLES), "laws": ("law", LAWS)}
+PARTS = {"profiles": PROFILES, "tables": TABLES, "laws": LAWS}
 BAD = ("fail", "crashed", "timed-out", "wrong-format", "error")
 VERDICTS = ("pass", "fail", "indeterminate", "declined", "unsupported", *BAD[1:])
 # An implementation that declines more has not been graded: of all questions, and of those of one group.
@@ -235,14 +235,14 @@ def graded_parts(passed: Sequence[Vector], *, is_timed: bool) -> dict[str, list[
     found = parts_needed((vector.kind, vector.scene) for vector in valid)
     if is_timed:
         found["profiles"].append("time")
-    lacking = [name for part, (_, names) in PARTS.items() for name in names if name not in found[part]]
+    lacking = [name for part, names in PARTS.items() for name in names if name not in found[part]]
     return {**found, "not_graded": lacking}
 
 
 def parts_needed(questions: Iterable[tuple[str, Mapping[str, Any] | None]]) -> dict[str, list[str]]:
     """Return the profiles, tables and laws that questions need, each by its profile and its scene."""
     seen = {need for profile, scene in questions for need in needs(profile, scene)}
-    return {part: [n for n in names if (what, n) in seen] for part, (what, names) in PARTS.items()}
+    return {part: [n for n in names if (part, n) in seen] for part, names in PARTS.items()}
 
 
 def _objection(result: Result, *others: Result) -> str:

@@ -28,7 +28,7 @@ import msgspec
 
 from conformance import vectors
 from conformance.cases.draw import Draw, leaves, readable
-from conformance.cases.generated import FRESH, ROUND, fresh
+from conformance.cases.generated import FRESH, ROUND, fresh_one
 from conformance.grading.agreement import Agreement, grade, middle
 from conformance.mutants.kill_matrix import diagnose
 from conformance.suite.checks import GROUPS, Implementation, checks_of, run_check, timing
@@ -131,9 +131,11 @@ class Transform(NamedTuple):
             return [self.restore(part, exponent) for part in answer]
         if not isinstance(answer, dict):
             return answer * 2.0**exponent if exponent and isinstance(answer, int | float) else answer
-        exponents = dict.fromkeys(("dt", "t", "captured"), -self.time)
-        exponents |= dict.fromkeys(("x", "y"), -self.length)
-        exponents |= dict.fromkeys(("vx", "vy"), self.time - self.length)
+        exponents = {
+            **dict.fromkeys(("dt", "t", "captured"), -self.time),
+            **dict.fromkeys(("x", "y"), -self.length),
+            **dict.fromkeys(("vx", "vy"), self.time - self.length),
+        }
         found = {name: self.restore(part, exponents.get(name, 0)) for name, part in answer.items()}
         if self.is_mirrored:
             found |= {name: -found[name] for name in ("x", "vx") if isinstance(found.get(name), float)}
@@ -190,7 +192,8 @@ class RunQuestions:
         self.level, self.seed = level, check_seed(seed)
         parts = tuple(groups) or OTHER_GROUPS
         n_fresh = N_FRESH[level] if FRESH in parts else 0
-        self.fresh: Iterable[Vector] = fresh(seed, n_fresh) if proved is None else proved
+        drawn = (fresh_one(seed, number) for number in range(1, n_fresh + 1))
+        self.fresh: Iterable[Vector] = drawn if proved is None else proved
         self.checks = [each for each in checks_of(level) if each.name.startswith(parts)]
         self.n = len(self.chosen) + n_fresh + len(self.checks)
 
@@ -324,7 +327,6 @@ def _tried(name: str, act: Callable[[], object]) -> Result:
 
 def ask_vector(session: Session, vector: Vector, transform: Transform = Transform()) -> Result:  # noqa: B008
     """Put an image of one vector to an open session, and grade the answer to the question as published."""
-    assert session.introduction is not None
     begin, is_refused = time.monotonic(), vector.expect[0].outcome == "rejected"
     if lacking := missing(session.introduction, vector.kind, None if is_refused else vector.scene):
         return _result(vector, CheckFailure("unsupported", lacking))
@@ -370,7 +372,6 @@ def measure_speed(session: Session) -> Speed | None:
 
     None where it is not offered, or where it ends in another place than `trajectory` (`checks.timing`).
     """
-    assert session.introduction is not None
     scene, state = load(TIMED_SCENE), TIMED_STATE
     if missing(session.introduction, "time", to_data(scene)):
         return None

@@ -124,7 +124,7 @@ class Session(AbstractContextManager["Session"]):
         """Start the process and exchange introductions.
 
         Raises:
-            CommandNotFound: when there is no such program.
+            BadInput: when there is no such program.
             CheckFailure: when it does not introduce itself in protocol 1; the session is then over.
         """
         self._process = (
@@ -239,20 +239,22 @@ class Session(AbstractContextManager["Session"]):
         return failure
 
 
-def missing(introduction: Introduction, profile: str, scene: Mapping[str, Any] | None) -> str:
+def missing(introduction: Introduction | None, profile: str, scene: Mapping[str, Any] | None) -> str:
     """Say what a question needs that an implementation does not list; empty when it lists all.
 
     Args:
-        introduction: what it said of itself.
+        introduction: what it said of itself, once opened.
         profile: step, trajectory, flow or time.
         scene: as for `needs`.
     """
-    offered = {"profile": introduction.profiles, "table": introduction.tables, "law": introduction.laws}
-    return ", ".join(f"{what} {name}" for what, name in needs(profile, scene) if name not in offered[what])
+    lacking = [
+        (part, name) for part, name in needs(profile, scene) if name not in getattr(introduction, part)
+    ]
+    return ", ".join(f"{part.removesuffix('s')} {name}" for part, name in lacking)
 
 
 def needs(profile: str, scene: Mapping[str, Any] | None) -> list[tuple[str, str]]:
-    """Return what a question needs: its profile, its table and the kinds of its laws.
+    """Return what a question needs of `profiles`, `tables` and `laws`: each with the name in an introduction.
 
     Args:
         profile: step, trajectory, flow or time.
@@ -260,10 +262,11 @@ def needs(profile: str, scene: Mapping[str, Any] | None) -> list[tuple[str, str]
             table and no law is needed.
     """
     if scene is None:
-        return [("profile", profile)]
+        return [("profiles", profile)]
     parts = {name: part for name, part in scene.items() if name not in ("table", "name", "notes")}
     kinds = {law["kind"] if isinstance(law, Mapping) else "constant" for law in parts.values()}
-    return [("profile", profile), ("table", str(scene["table"])), *(("law", kind) for kind in sorted(kinds))]
+    found = [("profiles", profile), ("tables", str(scene["table"]))]
+    return [*found, *(("laws", kind) for kind in sorted(kinds))]
 
 
 def probe_values() -> list[float]:
@@ -277,7 +280,6 @@ def probe_values() -> list[float]:
 
 
 UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
-MAX_OFFERED = 100  # profiles, tables or laws that an introduction may list
 ANSWERS = {"step": Answered, "trajectory": Steps, "flow": Flown, "time": Timed}
 
 
@@ -305,8 +307,9 @@ def read_introduction(line: bytes) -> Introduction:
             "wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}"
         )
     texts = {name: clean(getattr(introduction, name)) for name in ("name", "version", "language")}
-    lists = {name: getattr(introduction, name)[:MAX_OFFERED] for name in ("profiles", "tables", "laws")}
-    offered = {name: tuple(map(clean, words)) for name, words in lists.items()}
+    offered = {
+        name: tuple(map(clean, getattr(introduction, name))) for name in ("profiles", "tables", "laws")
+    }
     return msgspec.structs.replace(introduction, **texts, **offered)
 
 

@@ -16,6 +16,7 @@ Not in a sheet: how a process behaves, lines that are no questions, checks that 
 import csv
 import hashlib
 import io
+import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -401,21 +402,23 @@ def _once(places: dict[int, str], seq: int, place: str) -> None:
 
 
 def _of_tables(files: Sequence[Path], source: Path) -> Answers:
-    rows: dict[int, list[dict[str, Any]]] = {}
+    lines: dict[int, bytes] = {}
     places: dict[int, str] = {}
     for path in files:
-        last, label = None, f"answers {str(path)!r}"
-        for place, cells in read_rows(path, label, NEEDED, (*NEEDED, *OPTIONAL)):
-            number = read_number(place, "seq", cells["seq"])
-            if not number.is_integer():
-                raise BadInput(f"{place}: seq = {shown(cells['seq'])}, must be a whole number")
-            seq = int(number)
-            if seq != last:
-                _once(places, seq, place)
-            rows.setdefault(seq, []).append(_outcome(place, cells))
-            last = seq
-    lines = {seq: msgspec.json.encode(parts) for seq, parts in rows.items()}
+        rows = read_rows(path, f"answers {str(path)!r}", NEEDED, (*NEEDED, *OPTIONAL))
+        for seq, group in itertools.groupby(rows, _seq):
+            found = list(group)
+            _once(places, seq, found[0][0])
+            lines[seq] = msgspec.json.encode([_outcome(*row) for row in found])
     return Answers(str(source), lines, None, (), places)
+
+
+def _seq(row: tuple[str, dict[str, str]]) -> int:
+    place, cells = row
+    number = read_number(place, "seq", cells["seq"])
+    if not number.is_integer():
+        raise BadInput(f"{place}: seq = {shown(cells['seq'])}, must be a whole number")
+    return int(number)
 
 
 def read_rows(

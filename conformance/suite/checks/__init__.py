@@ -14,6 +14,7 @@ from conformance.suite.checks import flows, paths, requests, timing
 from conformance.suite.checks.form import QUESTIONS, Implementation, Question, SuiteCheck, run_check
 from conformance.suite.session import AnswerLine, Session
 from scene import Scene, State, transforms
+from scene.protocol.messages import PROFILES
 
 __all__ = ["Implementation", "SuiteCheck", "checks_of", "judge", "questions", "run_check"]
 
@@ -21,7 +22,6 @@ GROUPS = ("property", "profile", "promise")
 EXACT = ("mirror", "scaling-of-lengths", "scaling-of-times", "static-limit")  # to the bit, as a rule
 OF_HITS = ("angular-momentum", "symplectic")  # which a flow does not tell
 N_SYMMETRIES = 12
-ALL = (*QUESTIONS, "time")
 
 
 def moments(draw: Draw, profile: str, *, is_idle: bool = False) -> Iterator[Question]:
@@ -30,7 +30,7 @@ def moments(draw: Draw, profile: str, *, is_idle: bool = False) -> Iterator[Ques
     With `is_idle` the tables are at rest, and their constants are written as laws.
     """
     for _ in range(N_SYMMETRIES):
-        scene, state = paths.draw_start(draw, kinds=("fourier", "bang-bang", "constant"))
+        scene, state = paths.draw_start(draw)
         scene = transforms.idle(transforms.frozen(scene, state.t)) if is_idle else scene
         span = paths.crossing(scene, state)
         yield scene, state, state.t + span * (draw.between(0.25, 2.0) if profile == "flow" else 16.0)
@@ -68,7 +68,7 @@ RULES = (
     SuiteCheck("promise/minus-zero", requests.zeros, requests.same),
     SuiteCheck("promise/malformed-lines", requests.bad_lines, requests.passed_over),
     SuiteCheck("promise/extra-fields", requests.further_fields, requests.ignored_or_refused),
-    SuiteCheck("promise/bad-requests", requests.bad_requests, requests.refuse, ALL),
+    SuiteCheck("promise/bad-requests", requests.bad_requests, requests.refuse, PROFILES),
     SuiteCheck("promise/bad-states", requests.bad_states, requests.refuse),
     SuiteCheck("promise/bad-scenes", requests.bad_scenes, requests.refuse),
     SuiteCheck("promise/time-steps", timing.questions, timing.same_steps, ("time",)),

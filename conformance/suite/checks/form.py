@@ -17,6 +17,7 @@ from conformance.cases.draw import Draw
 from conformance.suite.process import NOT_NUMBERS, CheckFailure
 from conformance.suite.result import Result
 from conformance.suite.session import MAX_SEQ, Session, missing, outcomes_of, read_outcome
+from conformance.vectors import question, wire_data
 from scene import Collision, Outcome, Scene, State, to_data
 from scene.protocol.messages import Introduction
 
@@ -64,9 +65,7 @@ class Implementation:
         """Return one outcome: of a step, of a trajectory of one collision, or of a flow of one state."""
         if not all(math.isfinite(number) for number in (*msgspec.structs.astuple(state)[:5], t_end)):
             raise CheckFailure("fail", f"its answers lead to the state {state} and t_end = {t_end}")
-        part, *more = self.parts(question(self.profile, scene, state, t_end))
-        if more:
-            raise CheckFailure("wrong-format", f"{1 + len(more)} outcomes are answered to one question")
+        (part,) = self.parts(question(self.profile, scene, state, t_end), 1)
         return read_outcome(part, state.t)
 
     def by(self, *profiles: str, scene: Scene) -> "Implementation":
@@ -75,20 +74,29 @@ class Implementation:
         Raises:
             CheckFailure: unsupported, when it offers none.
         """
-        assert self.session.introduction is not None
         for profile in profiles:
             if not missing(self.session.introduction, profile, to_data(scene)):
                 return Implementation(self.session, profile)
         raise CheckFailure("unsupported", f"profile {' or '.join(profiles)}")
 
-    def parts(self, request: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Ask, and return and count the outcomes that are answered; a whole refusal is the only one."""
+    def parts(self, request: Mapping[str, Any], n_due: int | None = None) -> list[dict[str, Any]]:
+        """Ask, and return and count the outcomes that are answered; a whole refusal is the only one.
+
+        Args:
+            request: all but its seq.
+            n_due: how many outcomes answer it; None where that depends.
+
+        Raises:
+            CheckFailure: also error, and wrong-format for another number of outcomes.
+        """
         answer = self.session.ask(request)
         if "error" in answer:
             raise CheckFailure("error", answer["error"])
         found = outcomes_of(answer)
         self.n_asked += len(found)
         self.n_undecided += sum(part["outcome"] == "undecided" for part in found)
+        if n_due not in (None, len(found)):
+            raise CheckFailure("wrong-format", f"{n_due} outcomes are due, answered are {found}"[:200])
         return found
 
     def said(self, line: str) -> dict[str, Any]:
@@ -118,26 +126,8 @@ class Implementation:
         return found
 
     def flown(self, scene: Scene, states: Sequence[State], t_end: float) -> list[dict[str, Any]]:
-        """Carry states to t_end, and return what is answered for each.
-
-        Raises:
-            CheckFailure: also wrong-format, for another number of states.
-        """
-        found = self.parts(question("flow", scene, states, t_end)) if states else []
-        if len(found) != len(states):
-            raise CheckFailure("wrong-format", f"a flow of {len(states)} states is answered {found}"[:200])
-        return found
-
-
-def question(
-    cmd: str, scene: Scene | Mapping[str, Any], start: State | Sequence[State], t_end: float, n: int = 1
-) -> dict[str, Any]:
-    """Return a request, all but its seq."""
-    starts = [start] if isinstance(start, State) else list(start)
-    place = {"states": starts} if cmd == "flow" else {"state": starts[0]}
-    more = {"trajectory": {"collisions": n}, "time": {"collisions": n, "repeat": 1}}.get(cmd, {})
-    end = {} if cmd == "time" else {"t_end": t_end}
-    return {"cmd": cmd, "scene": _data(scene), **msgspec.to_builtins(place), **more, **end}
+        """Carry states to t_end, and return what is answered for each."""
+        return self.parts(question("flow", scene, states, t_end), len(states))
 
 
 def octaves(draw: Draw, low: float, high: float) -> Iterator[float]:
@@ -149,7 +139,6 @@ def octaves(draw: Draw, low: float, high: float) -> Iterator[float]:
 
 def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
     """Ask all that a check draws from a seed, of every profile that is offered, up to the first fault."""
-    assert session.introduction is not None
     begin, lacking = time.monotonic(), ""
     notes: list[str] = []
     n = n_compared = n_declined = n_open = n_asked = 0
@@ -190,23 +179,19 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
 
 
 def _draw_asked(
-    check: SuiteCheck, offered: Introduction, profile: str, seed: int
+    check: SuiteCheck, offered: Introduction | None, profile: str, seed: int
 ) -> tuple[list[Question], str]:
     """Return the questions that may be asked, drawn anew while too few are, and what the others need."""
     fitting: list[Question] = []
-    lacking = "" if profile in offered.profiles else f"profile {profile}"
+    lacking = missing(offered, profile, None)
     for i in range(0 if lacking else MAX_DRAWN):
         asked = list(check.asks(Draw(f"{seed}/{check.name}/{profile}/{i}"), profile))
-        needs = [missing(offered, profile, _data(one[0])) for one in asked]
+        needs = [missing(offered, profile, wire_data(one[0])) for one in asked]
         fitting += [one for one, need in zip(asked, needs, strict=True) if not need]
         lacking = next(filter(None, needs), lacking)
         if 2 * len(fitting) >= len(asked):
             break
     return fitting, lacking
-
-
-def _data(scene: Scene | Mapping[str, Any]) -> Mapping[str, Any]:
-    return scene if isinstance(scene, Mapping) else to_data(scene)
 
 
 def as_pytest(check: SuiteCheck, profile: str, asked: Question) -> str:

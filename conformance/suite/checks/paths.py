@@ -12,7 +12,7 @@ a tolerance, as the vectors let pass, to COARSE.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import hypot
 from typing import Any
 
@@ -23,7 +23,6 @@ from msgspec.structs import replace
 from conformance import plain
 from conformance.cases import scenes
 from conformance.cases.draw import Draw, leaves, readable, wire_form
-from conformance.plain.step import CaptureInterval
 from conformance.properties import BOUND, SLACK
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from conformance.suite.session import read_outcome
@@ -41,9 +40,9 @@ from scene import (
     Undecided,
 )
 from scene.geometry import half_width, table_at
-from scene.laws import bounds, is_constant
+from scene.laws import bounds
 from scene.tables import laws
-from scene.transforms import scaled
+from scene.transforms import scaled, scaled_state
 
 FINE, COARSE = 2.0**-36, SLACK * BOUND  # of sizes
 FLIGHT = 2.0**-48  # of sizes: a straight flight, of a stepper that is fine
@@ -90,8 +89,6 @@ def flaw_of(scene: Scene, start: State, path: Sequence[Outcome], errors: Errors)
     if not ends:
         return ""
     rows = np.array([[at.t, at.x, at.y, at.vx, at.vy] for at in (start, *ends)], dtype=float)
-    if not np.isfinite(rows).all():
-        return "has a number that is none"
     before, after = rows[:-1].T, rows[1:].T
     dt = np.array([getattr(at, "dt", at.t - t) for at, t in zip(ends, rows[:-1, 0], strict=True)])
     walls = np.array([getattr(at, "wall", "") for at in ends])
@@ -143,7 +140,7 @@ def _first_flaw(
     }
     bad = {why: int(np.argmax(where)) for why, where in flaws.items() if where.any()}
     if not bad:
-        return _not_kept(scene, start, after)
+        return ""
     why = min(bad, key=lambda name: bad[name])
     return f"outcome {bad[why] + 1} {why}"
 
@@ -205,21 +202,6 @@ def _beyond(scene: Scene, before: Any, dt: Any, walls: Any, end: tuple[Any, Any]
     return (out / table.size).max(axis=1)
 
 
-def _not_kept(scene: Scene, start: State, after: Any) -> str:
-    """Say what a table at rest does not keep: speed, and in a cap the size of the spin."""
-    if not all(is_constant(law) for law in laws(scene).values()):
-        return ""
-    _, x, y, vx, vy = after
-    speed = hypot(start.vx, start.vy)
-    if (np.abs(np.hypot(vx, vy) - speed) > SLACK * BOUND * speed).any():
-        return "has another speed than at the start, in a table at rest"
-    spin = abs(start.x * start.vy - start.y * start.vx)
-    allowed = SLACK * BOUND * float(table_at(fp, scene, start.t).size) * speed
-    if isinstance(scene, Cap) and (np.abs(np.abs(x * vy - y * vx) - spin) > allowed).any():
-        return "has another |x vy - y vx| than at the start, in a cap at rest"
-    return ""
-
-
 def first_capture(
     scene: Mushroom, start: State, hits: Sequence[Outcome], t_end: float
 ) -> tuple[float, float] | None:
@@ -231,20 +213,18 @@ def first_capture(
         hits: its collisions up to t_end.
         t_end: [time].
     """
-    stay = CaptureInterval()
-    vx, vy = start.vx, start.vy
+    path = plain.PlainPath(scene, start, t_end)
     for hit in hits:
         assert isinstance(hit, Collision)
-        if hit.wall == "arc":
-            reach = float(half_width(fp, scene, hit.t)) * hypot(vx, vy)
-            spin = abs(hit.x * vy - hit.y * vx)
-            if abs(spin - reach) <= ON_EDGE * reach:
-                return UNCLEAR
-            stay = stay.after(hit.t, spin > reach)
-        elif hit.wall != "base" and stay.begin is not None:
-            return stay.until(hit.t)
-        vx, vy = hit.vx, hit.vy
-    return stay.until(t_end)
+        vx, vy = path.state.vx, path.state.vy
+        reach = float(half_width(fp, scene, hit.t)) * hypot(vx, vy)
+        spin = abs(hit.x * vy - hit.y * vx)
+        if hit.wall == "arc" and not path.stays and abs(spin - reach) <= ON_EDGE * reach:
+            return UNCLEAR
+        path.watch(hit)
+        path.state = hit.state()
+    path.close(t_end)
+    return path.stays[0] if path.stays else None
 
 
 def follow(side: Implementation, scene: Scene, state: State, n: int, t_end: float = FOREVER) -> bool:
@@ -314,6 +294,23 @@ def distance(scene: Scene, a: Outcome, b: Outcome) -> float:
     return math.inf if math.isnan(found) else found
 
 
+def answered_distance(
+    scene: Scene, one: Mapping[str, Any], other: Mapping[str, Any], t: float, span: float = math.inf
+) -> float:
+    """Return how far two answered outcomes are apart, as `distance`; infinite for other capture intervals.
+
+    Args:
+        scene: of both.
+        one: an outcome as it is answered.
+        other: likewise.
+        t: when the flight began.
+        span: of time, by which capture intervals are measured.
+    """
+    if not is_same_capture(one.get("captured"), other.get("captured"), span):
+        return math.inf
+    return distance(scene, read_outcome(one, t), read_outcome(other, t))
+
+
 def is_same_capture(a: Sequence[float] | None, b: Sequence[float] | None, span: float) -> bool:
     """Tell whether two capture intervals of one particle are equal up to amplified rounding."""
     if a is None or b is None:
@@ -352,9 +349,7 @@ def edges(draw: Draw, profile: str) -> Iterator[Question]:
         for make in (aimed, through_the_mouth, through_the_mouth, slanted, along_the_arc, nearly_captured):
             scene, state, n = make(draw, near)
             k, j = draw.pick(range(-20, 21)), draw.pick(range(-20, 21))
-            unit, clock = 2.0**k, 2.0**j
-            x, y, vx, vy = state.x * unit, state.y * unit, state.vx * unit / clock, state.vy * unit / clock
-            yield scaled(scene, k, j), State(state.t * clock, x, y, vx, vy, state.wall), n
+            yield scaled(scene, k, j), scaled_state(state, k, j), n
 
 
 def _table(draw: Draw, w: float, h: Any = None) -> Mushroom:

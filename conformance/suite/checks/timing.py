@@ -16,10 +16,11 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from conformance.cases.draw import Draw
-from conformance.suite.checks.form import Implementation, Question, question
+from conformance.suite.checks.form import Implementation, Question
 from conformance.suite.checks.paths import distance
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Session, read_outcome
+from conformance.vectors import question
 from scene import Cap, Collision, Fourier, Outcome, Scene, State, Stem, Undecided
 
 N_STEPS = 60  # collisions of the trajectory that `time` and `trajectory` both follow

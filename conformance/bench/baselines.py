@@ -169,8 +169,8 @@ def _solver(name: str, family: Family, engine: Engine, flights: float = FLIGHTS)
     def run(workload: Workload, n_times: int) -> SolverRun:
         states = [q.state for q in workload.questions]
         followed, t_end, most = states, workload.end(flights), MOST
-        if workload.length:
-            followed, t_end, most = states[:1], np.inf, workload.length
+        if workload.rule.length:
+            followed, t_end, most = states[:1], np.inf, workload.rule.length
         n_hits, seconds = engine.follow(questions(workload.scene, followed), t_end, most, n_times)
         if not n_hits:
             raise CheckFailure("fail", "it meets no wall")

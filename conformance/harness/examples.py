@@ -52,7 +52,9 @@ def find_kit_examples(folder: Path, flags: Sequence[str] = ("-O3",)) -> dict[str
     """Return the examples of the adapter kits, by what the engine gives; as `find_examples`."""
     python = FOLDER / "python"
     return {
-        "C++, next hit": _build_cpp(folder, flags),
+        "C++, next hit": compiled(
+            "C++", [*flags, "-std=c++17"], FOLDER / "cpp" / "engine.cpp", folder / "engine"
+        ),
         "Python, implicit domain": Example((sys.executable, str(python / "implicit.py"))),
         "Python, intersection and reflection": Example((sys.executable, str(python / "parts.py"))),
     }
@@ -86,8 +88,3 @@ def _build_c(folder: Path, flags: Sequence[str]) -> Example:
     if "jansson.h" in built.why_not:
         return _absent("jansson.h is not installed (Debian: libjansson-dev)")
     return built
-
-
-def _build_cpp(folder: Path, flags: Sequence[str]) -> Example:
-    source = FOLDER / "cpp" / "engine.cpp"
-    return compiled("C++", [*flags, "-std=c++17"], source, folder / source.stem)

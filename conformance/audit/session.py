@@ -8,7 +8,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -119,7 +119,7 @@ def conduct(
                 size=settings.size,
                 seed=settings.seed,
                 threads=settings.threads,
-                progress=progress,
+                progress=partial(progress, name, RUNS[name].n_particles(settings.size)) if progress else None,
             )
     for claim in claims:
         if claim.id not in found:

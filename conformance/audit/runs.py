@@ -248,9 +248,9 @@ def draw(
     size: Size,
     seed: int,
     threads: int | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int], None] = lambda _: None,
 ) -> Sample:
-    """Follow a run's particles.
+    """Follow a run's particles, and keep what the audit looks at of those followed to the end.
 
     Args:
         simulate: `fast.simulate`, or another with its signature; it may know the particles from before.
@@ -270,11 +270,6 @@ def draw(
         phases=run.phases,
         progress=progress,
     )
-    return reduced(run, ensemble)
-
-
-def reduced(run: Simulation, ensemble: Ensemble) -> Sample:
-    """Return what the audit keeps of an ensemble, particles not followed left out."""
     energies = ensemble.cycle_energies
     followed = (ensemble.outcome == 0) & np.all(np.isfinite(energies) & (energies > 0), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from fractions import Fraction
-from functools import cache, partial
+from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -110,7 +110,15 @@ def by_command(
     """
     session = stack.enter_context(Session(command, limits))
     session.start()
-    clock_failure = cache(partial(_clock_failure, session))  # its clock is looked at once
+
+    @cache  # its clock is looked at once
+    def clock_failure() -> CheckFailure | None:
+        """Hold what it says of its time to the clock on this side; a run is too short to do so."""
+        try:
+            timing.honest_clock(Implementation(session, "time"), timing.SCENES[0], timing.START)
+        except CheckFailure as failure:
+            return failure
+        return None
 
     def run(workload: Workload, n_times: int) -> SolverRun:
         assert session.introduction is not None
@@ -127,15 +135,6 @@ def by_command(
         return SolverRun(lasted / (n_times * len(answers)), answers, lasted)
 
     return Solver(name, family, run)
-
-
-def _clock_failure(session: Session) -> CheckFailure | None:
-    """Hold what a command says of its time to the clock on this side; a run is too short to do so."""
-    try:
-        timing.honest_clock(Implementation(session, "time"), timing.SCENES[0], timing.START)
-    except CheckFailure as failure:
-        return failure
-    return None
 
 
 class Effort(NamedTuple):

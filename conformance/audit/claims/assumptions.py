@@ -56,7 +56,16 @@ def filling(evidence: ClaimEvidence) -> Iterator[Check]:
             states = [State(t, end.x, end.y, end.vx, end.vy) for end in ends]
             zone = in_the_zone(table, t, np.array([(end.x, end.y, end.vx, end.vy) for end in ends]))
             places.append(zone)
-            yield _share_below(f"{name} at {phase:g} of its cycle", table, t, zone)
+            volumes = theory.volumes_at(fp, table, t)
+            even = volumes.v_stem / volumes.v_cha
+            yield close(
+                f"{name} at {phase:g} of its cycle: share below the mouth",
+                zone.below,
+                even,
+                band=_unmixed(table, t),
+                scale=0.2,
+                against=("a tenth less", 0.9 * float(even)),
+            )
         for what, k, rival, other in EVEN:
             yield fits(
                 f"{name}, {len(PHASES)} phases: {what}",
@@ -123,18 +132,6 @@ def in_the_zone(table: Scene, t: float, rows: FloatArray) -> Zone:
         _chords(offset[zone & ~below]) / _chords(nu),
         (2 * now.w * depth - now.slope * depth**2) / now.stem_area(),
         np.arctan2(vy, vx)[below] / (2 * np.pi) % 1.0,
-    )
-
-
-def _share_below(label: str, table: Scene, t: float, zone: Zone) -> Check:
-    volumes = theory.volumes_at(fp, table, t)
-    return close(
-        f"{label}: share below the mouth",
-        zone.below,
-        volumes.v_stem / volumes.v_cha,
-        band=_unmixed(table, t),
-        scale=0.2,
-        against=("a tenth less", 0.9 * float(volumes.v_stem / volumes.v_cha)),
     )
 
 

@@ -6,7 +6,6 @@ other.
 """
 
 from collections.abc import Iterator, Sequence
-from decimal import ROUND_HALF_EVEN, Decimal
 from functools import partial
 from typing import Any
 
@@ -19,7 +18,7 @@ import theory
 from conformance.audit.claim import DIGITS, Check, ClaimEvidence, Form
 from conformance.audit.claims.finite_energy import Figure, captured_change, less_bias
 from conformance.audit.runs import scene_of
-from conformance.audit.tolerances import close, exact, mean, stated
+from conformance.audit.tolerances import close, exact, half_unit, mean, stated
 from scene import State
 from scene.geometry import table_at
 from scene.laws import bounds, value
@@ -43,14 +42,8 @@ SIMULATED = (
 
 def rounds(what: str, printed: str, value: Any, form: Form) -> Check:
     """Check that theory rounds to a printed number."""
-    return Check(what, rounds_to(printed, value), printed, float(value), form=form)
-
-
-def rounds_to(printed: str, value: Any) -> bool:
-    """Tell whether a number, rounded to as many decimals as were printed, is the printed one."""
-    number = Decimal(printed)
-    exact = Decimal(mpmath.nstr(mpmath.mpf(value), 30, min_fixed=-mpmath.inf, max_fixed=mpmath.inf))
-    return exact.quantize(number, ROUND_HALF_EVEN) == number
+    found = float(value)
+    return Check(what, abs(found - float(printed)) <= half_unit(printed), printed, found, form=form)
 
 
 def half_angle(evidence: ClaimEvidence) -> list[Check]:

@@ -147,7 +147,7 @@ def _check_report(folder: Path, wanted: set[str]) -> None:
 def _watch_runs(bar: progress.Progress) -> Callable[[str, int, int], None]:
     """Return what moves a bar for each run."""
     watch_of = cache(partial(Watch, bar, unit="particles"))
-    return lambda run, n_done, n_total: watch_of(run).update(n_done, n_total)
+    return lambda run, n_total, n_done: watch_of(run).update(n_done, n_total)
 
 
 FOLDER = "runs"

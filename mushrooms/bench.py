@@ -219,8 +219,8 @@ def _lanes(workload: Workload, n_times: int) -> SolverRun:
     """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
     states = [q.state for q in workload.questions]
     copies = -(-128 // len(states))  # enough to fill both pools
-    followed = states[:1] if workload.length else states * copies
-    t_end = workload.end(workload.length or FLIGHTS)
+    followed = states[:1] if workload.rule.length else states * copies
+    t_end = workload.end(workload.rule.length or FLIGHTS)
     seconds, n_collisions = 0.0, 0
     for _ in range(n_times):
         run, lasted = carry(workload.scene, followed, [None] * len(followed), t_end, 1)
@@ -234,10 +234,10 @@ def _trajectory(workload: Workload, n_times: int) -> SolverRun:
     paths = [fast.trajectory(workload.scene, state, 1) for state in states]
     begin = time.perf_counter_ns()
     for _ in range(n_times):
-        fast.trajectory(workload.scene, states[0], workload.length)
+        fast.trajectory(workload.scene, states[0], workload.rule.length)
     ns = time.perf_counter_ns() - begin
     answers: list[SolverAnswer] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
-    return SolverRun(ns / (n_times * workload.length), answers, ns)
+    return SolverRun(ns / (n_times * workload.rule.length), answers, ns)
 
 
 def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:

@@ -134,10 +134,10 @@ class AuditSteppers(NamedTuple):
 
 
 class ClaimEvidence:
-    """What the check of one claim looks at.
+    """What the checks of claims look at.
 
     Args:
-        samples: by run, those that the claim names.
+        samples: by run, those that the claims name.
         steppers: for claims that follow single particles.
         size: of the audit.
         seed: of the audit.

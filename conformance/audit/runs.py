@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 Simulate = Callable[..., "Ensemble"]
-Progress = Callable[[str, int, int], None]  # run, particles done, particles in all
+Progress = Callable[[str, int, int], None]  # run, particles in all, particles done
 
 MAX_LOST = 1e-3  # a larger unfollowed share could hide a bias as large as the errors themselves
 Size = Literal["quick", "full"]
@@ -248,9 +248,9 @@ def draw(
     size: Size,
     seed: int,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Callable[[int], None] = lambda _: None,
 ) -> Sample:
-    """Follow a run's particles.
+    """Follow a run's particles, and keep what the audit looks at of those followed to the end.
 
     Args:
         simulate: `fast.simulate`, or another with its signature; it may know the particles from before.
@@ -260,27 +260,16 @@ def draw(
         threads: for the stepper; all by default.
         progress: told of the particles done, again and again.
     """
-    n_particles = run.n_particles(size)
-
-    def tell(n_done: int) -> None:
-        if progress:
-            progress(run.name, n_done, n_particles)
-
     ensemble = simulate(
         scene_of(run),
-        n_particles=n_particles,
+        n_particles=run.n_particles(size),
         energy=run.energy,
         n_cycles=run.n_cycles,
         seed=run_seed(seed, run),
         threads=threads,
         phases=run.phases,
-        progress=tell,
+        progress=progress,
     )
-    return reduced(run, ensemble)
-
-
-def reduced(run: Simulation, ensemble: Ensemble) -> Sample:
-    """Return what the audit keeps of an ensemble, particles not followed left out."""
     energies = ensemble.cycle_energies
     followed = (ensemble.outcome == 0) & np.all(np.isfinite(energies) & (energies > 0), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

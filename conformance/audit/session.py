@@ -8,7 +8,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -85,7 +85,7 @@ def conduct(
     claims: Sequence[Claim] | None = None,
     predict: Predict = theory.predict,
     simulate_run: Callable[[str], Simulate] | None = None,
-    progress: Progress | None = None,
+    progress: Progress = lambda *_: None,
 ) -> AuditResult:
     """Conduct an audit.
 
@@ -109,7 +109,6 @@ def conduct(
         code()  # before anything is examined: an edit meanwhile is not what runs, and must not be told as it
     known = {claim.id: _kept(claim, settings) for claim in claims}
     found = {name: from_data(data["finding"]) for name, data in known.items() if data.get("code") == code()}
-    predict = cache(predict)
     samples: dict[str, Sample] = {}
     for name in dict.fromkeys(run for claim in claims for run in claim.runs):
         if RUNS[name].n_particles(settings.size):
@@ -119,11 +118,19 @@ def conduct(
                 size=settings.size,
                 seed=settings.seed,
                 threads=settings.threads,
-                progress=progress,
+                progress=partial(progress, name, RUNS[name].n_particles(settings.size)),
             )
+    evidence = ClaimEvidence(
+        samples,
+        steppers,
+        size=settings.size,
+        seed=settings.seed,
+        threads=settings.threads,
+        predict=cache(predict),
+    )
     for claim in claims:
         if claim.id not in found:
-            found[claim.id] = examine(claim, samples, steppers, settings, predict)
+            found[claim.id] = examine(claim, evidence)
         _save(claim, found[claim.id], settings)
     findings = [found[claim.id] for claim in claims]
     return AuditResult(settings, tuple(claims), findings, samples, time.perf_counter() - begin)
@@ -134,30 +141,14 @@ def kept(settings: AuditSettings) -> set[str]:
     return {claim.id for claim in all_claims() if _kept(claim, settings)}
 
 
-def examine(
-    claim: Claim,
-    samples: dict[str, Sample],
-    steppers: AuditSteppers,
-    settings: AuditSettings,
-    predict: Predict,
-) -> Finding:
+def examine(claim: Claim, evidence: ClaimEvidence) -> Finding:
     """Make a claim's checks; with particles lost it cannot be better than open."""
     begin = time.perf_counter()
-    evidence = ClaimEvidence(
-        samples, steppers, size=settings.size, seed=settings.seed, threads=settings.threads, predict=predict
-    )
     checks = list(claim.examine(evidence))
     verdict = verdict_of(claim, checks)
-    if verdict != "refuted" and not all(samples[run].is_whole for run in claim.runs if run in samples):
+    if verdict != "refuted" and not all(sample.is_whole for sample in evidence.samples(*claim.runs)):
         verdict = "indeterminate"
     return Finding(claim.id, verdict, checks, time.perf_counter() - begin)
-
-
-def _key(claim: Claim, settings: AuditSettings) -> str:
-    runs = [(run, RUNS[run].n_particles(settings.size)) for run in claim.runs]
-    return json.dumps(
-        [claim.id, claim.statement, claim.method, claim.tolerance, settings.size, settings.seed, runs]
-    )
 
 
 def _kept(claim: Claim, settings: AuditSettings) -> dict[str, Any]:
@@ -166,7 +157,7 @@ def _kept(claim: Claim, settings: AuditSettings) -> dict[str, Any]:
         unsealed(settings.folder / f"{claim.id}.finding") if settings.folder and settings.resume else None
     )
     data: dict[str, Any] = json.loads(content) if content else {}
-    return data if data.get("key") == _key(claim, settings) else {}
+    return data if data.get("settings") == [settings.size, settings.seed] else {}
 
 
 @cache
@@ -187,5 +178,5 @@ def code() -> str:
 
 def _save(claim: Claim, finding: Finding, settings: AuditSettings) -> None:
     if settings.folder:
-        content = json.dumps({"key": _key(claim, settings), "code": code(), "finding": to_data(finding)})
-        write_file(settings.folder / f"{claim.id}.finding", sealed(content.encode()))
+        data = {"settings": [settings.size, settings.seed], "code": code(), "finding": to_data(finding)}
+        write_file(settings.folder / f"{claim.id}.finding", sealed(json.dumps(data).encode()))

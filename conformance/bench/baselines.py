@@ -147,21 +147,6 @@ def in_c(library: Path) -> list[Solver]:
     ]
 
 
-def stepper(solver: Solver) -> Stepper:
-    """Return a baseline as a stepper of one state, taken as it is; t_end alone ends a flight."""
-    assert solver.steps is not None
-    steps = solver.steps
-
-    def step(scene: Scene, state: State, t_end: float) -> Outcome:
-        (met,) = steps(scene, [state])
-        if isinstance(met, Collision) and met.t < t_end:
-            return met
-        left = t_end - state.t
-        return Horizon(t_end, state.x + left * state.vx, state.y + left * state.vy, state.vx, state.vy)
-
-    return step
-
-
 def _solver(name: str, family: Family, engine: Engine, flights: float = FLIGHTS) -> Solver:
     def steps(scene: Scene, states: Sequence[State]) -> list[SolverAnswer]:
         return [_outcome(row) for row in engine.hits(questions(scene, states)).tolist()]
@@ -169,8 +154,8 @@ def _solver(name: str, family: Family, engine: Engine, flights: float = FLIGHTS)
     def run(workload: Workload, n_times: int) -> SolverRun:
         states = [q.state for q in workload.questions]
         followed, t_end, most = states, workload.end(flights), MOST
-        if workload.length:
-            followed, t_end, most = states[:1], np.inf, workload.length
+        if workload.rule.length:
+            followed, t_end, most = states[:1], np.inf, workload.rule.length
         n_hits, seconds = engine.follow(questions(workload.scene, followed), t_end, most, n_times)
         if not n_hits:
             raise CheckFailure("fail", "it meets no wall")
@@ -266,15 +251,24 @@ def in_python() -> list[Solver]:
     ]
 
 
-def _built(name: str) -> Stepper:
-    with tempfile.TemporaryDirectory() as folder:  # the library stays loaded
-        library, _ = build(Path(folder), FLAGS)
-        return stepper(next(one for one in in_c(library) if one.name == name))
+def _built(parts: int) -> Stepper:
+    """Build the C file; return it as a stepper of one state, taken as it is. t_end alone ends a flight."""
+    with tempfile.TemporaryDirectory() as folder:
+        engine = Engine(build(Path(folder), FLAGS)[0], parts)  # the library stays loaded
+
+    def step(scene: Scene, state: State, t_end: float) -> Outcome:
+        met = _outcome(engine.hits(questions(scene, [state]))[0].tolist())
+        if isinstance(met, Collision) and met.t < t_end:
+            return met
+        left = t_end - state.t
+        return Horizon(t_end, state.x + left * state.vx, state.y + left * state.vy, state.vx, state.vy)
+
+    return step
 
 
 NAMES: dict[str, Callable[[], Stepper]] = {
-    "lean-c": partial(_built, "lean C"),
-    **{f"steps-{parts}": partial(_built, f"steps, flight/{parts}") for parts in PARTS},
+    "lean-c": partial(_built, 0),
+    **{f"steps-{parts}": partial(_built, parts) for parts in PARTS},
     **{f"solve-ivp-{rtol:.0e}": partial(next_collision_by, rtol) for rtol in TOLERANCES},
 }
 

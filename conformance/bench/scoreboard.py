@@ -13,7 +13,7 @@ from typing import NamedTuple
 from conformance import suite
 from conformance.bench.baselines import NAMES
 from conformance.files import write_file
-from conformance.harness.examples import find_examples, find_kit_examples
+from conformance.harness.examples import Example, find_examples, find_kit_examples
 from conformance.suite.result import Run
 from conformance.suite.session import Limits
 
@@ -68,17 +68,15 @@ class Graded(NamedTuple):
     why_not: str = ""
 
 
-def commands(folder: Path) -> list[tuple[str, tuple[str, ...], str]]:
-    """List name, command and, where there is none here, the reason."""
-    ours = {name: (sys.executable, "-m", module) for name, module in OURS.items()}
-    baselines = (name for name in NAMES if name not in LEFT_OUT)
-    found = {f"example in {language}": example for language, example in find_examples(folder).items()}
-    found |= {f"kit, {engine}": example for engine, example in find_kit_examples(folder).items()}
-    return [
-        *((name, command, "") for name, command in ours.items()),
-        *((name, example.command, example.why_not) for name, example in found.items()),
-        *((name, (sys.executable, "-m", "conformance.bench.baselines", name), "") for name in baselines),
-    ]
+def find_steppers(folder: Path) -> dict[str, Example]:
+    """Return by name how each stepper of the page runs here, or why it cannot."""
+    baselines = [name for name in NAMES if name not in LEFT_OUT]
+    return {
+        **{name: Example((sys.executable, "-m", module)) for name, module in OURS.items()},
+        **{f"example in {language}": example for language, example in find_examples(folder).items()},
+        **{f"kit, {engine}": example for engine, example in find_kit_examples(folder).items()},
+        **{name: Example((sys.executable, "-m", "conformance.bench.baselines", name)) for name in baselines},
+    }
 
 
 def page(entries: list[Graded], corpus: str) -> str:
@@ -120,10 +118,10 @@ def main() -> None:
     """Grade all and write the page."""
     entries = []
     with tempfile.TemporaryDirectory() as folder:
-        for name, command, why_not in commands(Path(folder)):
-            run = suite.check(command, seed=SEED, limits=LIMITS) if command else None
-            entries.append(Graded(name, run, why_not))
-            print(f"{name}: {run.verdict() if run else why_not}", file=sys.stderr, flush=True)
+        for name, example in find_steppers(Path(folder)).items():
+            run = suite.check(example.command, seed=SEED, limits=LIMITS) if example.command else None
+            entries.append(Graded(name, run, example.why_not))
+            print(f"{name}: {run.verdict() if run else example.why_not}", file=sys.stderr, flush=True)
     corpus = next(entry.run.corpus for entry in entries if entry.run)
     write_file(PAGE, page(entries, corpus))
 

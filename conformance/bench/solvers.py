@@ -15,10 +15,10 @@ one backward ulp at each step can grow to (the predicted bound).
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from fractions import Fraction
-from functools import cache, partial
+from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -110,7 +110,15 @@ def by_command(
     """
     session = stack.enter_context(Session(command, limits))
     session.start()
-    clock_failure = cache(partial(_clock_failure, session))  # its clock is looked at once
+
+    @cache  # its clock is looked at once
+    def clock_failure() -> CheckFailure | None:
+        """Hold what it says of its time to the clock on this side; a run is too short to do so."""
+        try:
+            timing.honest_clock(Implementation(session, "time"), timing.SCENES[0], timing.START)
+        except CheckFailure as failure:
+            return failure
+        return None
 
     def run(workload: Workload, n_times: int) -> SolverRun:
         assert session.introduction is not None
@@ -127,15 +135,6 @@ def by_command(
         return SolverRun(lasted / (n_times * len(answers)), answers, lasted)
 
     return Solver(name, family, run)
-
-
-def _clock_failure(session: Session) -> CheckFailure | None:
-    """Hold what a command says of its time to the clock on this side; a run is too short to do so."""
-    try:
-        timing.honest_clock(Implementation(session, "time"), timing.SCENES[0], timing.START)
-    except CheckFailure as failure:
-        return failure
-    return None
 
 
 class Effort(NamedTuple):
@@ -169,37 +168,37 @@ def measure(
     Returns:
         A point for each solver, and what failed of the others.
     """
-    running: list[tuple[Solver, int, int]] = []
-    runs: dict[str, list[SolverRun]] = {}
+    running: list[tuple[Solver, int, int, list[SolverRun]]] = []
     failures: dict[str, str] = {}
-    for solver in solvers:
-        if workload.name not in solver.serves:
-            continue
-        tick(solver.name)
+
+    @contextmanager
+    def noting_failures(solver: Solver) -> Iterator[None]:
         try:
-            running.append(_warm_up(solver, workload, effort))
+            yield
         except CheckFailure as failure:
             failures[solver.name] = f"{failure.verdict}: {failure.why}"
-            continue
-        runs[solver.name] = []
+
+    for solver in solvers:
+        if workload.rule.name in solver.serves:
+            tick(solver.name)
+            with noting_failures(solver):
+                running.append((solver, *_warm_up(solver, workload, effort), []))
     for number in range(effort.repeats):
-        for solver, n_times, n_runs in running:
+        for solver, n_times, n_runs, runs in running:
             if number < n_runs and solver.name not in failures:
-                try:
-                    runs[solver.name].append(solver.run(workload, n_times))
-                    _check_runs(runs[solver.name])
-                except CheckFailure as failure:
-                    failures[solver.name] = f"{failure.verdict}: {failure.why}"
+                with noting_failures(solver):
+                    runs.append(solver.run(workload, n_times))
+                    _check_runs(runs)
         tick("")
     points = [
-        _point(workload, solver, n_times, runs[solver.name])
-        for solver, n_times, _ in running
+        _point(workload, solver, n_times, runs)
+        for solver, n_times, _, runs in running
         if solver.name not in failures
     ]
     return points, failures
 
 
-def _warm_up(solver: Solver, workload: Workload, effort: Effort) -> tuple[Solver, int, int]:
+def _warm_up(solver: Solver, workload: Workload, effort: Effort) -> tuple[int, int]:
     """Return how many times a run is to take the steps, and how many runs there is time for."""
     n_times = 1
     lasted = solver.run(workload, 1).lasted
@@ -207,7 +206,7 @@ def _warm_up(solver: Solver, workload: Workload, effort: Effort) -> tuple[Solver
         n_times = min(MAX_TIMES, max(2 * n_times, math.ceil(1.2 * n_times * effort.least_ns / (lasted + 1))))
         lasted = solver.run(workload, n_times).lasted
     n_runs = min(effort.repeats, max(MIN_REPEATS, int(effort.most_ns / (lasted + 1))))
-    return solver, n_times, n_runs
+    return n_times, n_runs
 
 
 def _check_runs(runs: Sequence[SolverRun]) -> None:
@@ -223,7 +222,7 @@ def _point(workload: Workload, solver: Solver, n_times: int, runs: Sequence[Solv
     right = [errors for kind, *errors in graded if kind == "right"]
     further, astray = _count_walls(workload, solver)
     return Point(
-        workload=workload.name,
+        workload=workload.rule.name,
         solver=solver.name,
         family=solver.family,
         n_times=n_times,

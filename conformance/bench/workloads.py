@@ -44,42 +44,17 @@ class FurtherStep(NamedTuple):
     wall: Wall
 
 
-class Workload(NamedTuple):
-    """Questions of one kind.
-
-    Attributes:
-        name: words joined by hyphens.
-        what: in a line.
-        scene: of all questions.
-        questions: one step each.
-        length: the time is that of one particle's path of so many collisions; 0: of all the questions.
-        further: steps of the same kind, on which only walls are compared.
-    """
-
-    name: str
-    what: str
-    scene: Scene
-    questions: list[ProvedStep]
-    length: int = 0
-    further: Sequence[FurtherStep] = ()
-
-    def end(self, flights: float = FLIGHTS) -> float:
-        """Return the time that lies so many flights after the last question."""
-        last = max((q.state for q in self.questions), key=lambda state: state.t)
-        flight = float(rounded(self.scene, last.t).size) / math.hypot(last.vx, last.vy)
-        return last.t + flights * flight
-
-
 class Rule(NamedTuple):
     """How a workload's questions are drawn.
 
     Attributes:
-        name, what: as in Workload.
+        name: words joined by hyphens.
+        what: in a line.
         scene: of the catalogue, or of SCENES.
         draw: from a stream of numbers, the scene and a time to a state.
         speed: about that of the particle, for the time that the flights take.
         is_flown: whether the question begins at the first collision of what was drawn.
-        length: as in Workload.
+        length: the time is that of one particle's path of so many collisions; 0: of all the questions.
     """
 
     name: str
@@ -89,6 +64,28 @@ class Rule(NamedTuple):
     speed: float
     is_flown: bool = True
     length: int = 0
+
+
+class Workload(NamedTuple):
+    """Questions of one kind.
+
+    Attributes:
+        rule: by which they are drawn.
+        scene: of all questions.
+        questions: one step each.
+        further: steps of the same kind, on which only walls are compared.
+    """
+
+    rule: Rule
+    scene: Scene
+    questions: list[ProvedStep]
+    further: Sequence[FurtherStep] = ()
+
+    def end(self, flights: float = FLIGHTS) -> float:
+        """Return the time that lies so many flights after the last question."""
+        last = max((q.state for q in self.questions), key=lambda state: state.t)
+        flight = float(rounded(self.scene, last.t).size) / math.hypot(last.vx, last.vy)
+        return last.t + flights * flight
 
 
 def _flight(energy: float) -> tuple[Callable[[Draw, Scene, float], Drawn], float]:
@@ -152,11 +149,6 @@ SCENES: dict[str, Scene] = {
 }
 
 
-def scene_of(rule: Rule) -> Scene:
-    """Return a rule's scene."""
-    return SCENES[rule.scene] if rule.scene in SCENES else load(rule.scene)
-
-
 RULES: tuple[Rule, ...] = (
     Rule("breathing-disk", "the cap alone, energy 1e6", "breathing-circle", *_flight(1e6)),
     Rule("fixed-cap", "sec. 4.1, bang-bang, energy 1e9", "fixed-cap-anticlockwise", *_flight(1e9)),
@@ -189,13 +181,14 @@ def draw_workload(
         n_further: how many further steps.
         trust: names their walls.
     """
-    scene, further = scene_of(rule), list[FurtherStep]()
+    scene = SCENES[rule.scene] if rule.scene in SCENES else load(rule.scene)
+    further = list[FurtherStep]()
     questions = [_question(rule, scene, f"bench {seed} {rule.name} {i}", prove) for i in range(n_questions)]
     if trust is not None:
         key = f"bench {seed} {rule.name} further"
         drawn = [_draw_step(rule, scene, f"{key} {i}", trust) for i in range(n_further)]
         further = [FurtherStep(state, wall) for state, _, wall in drawn]
-    return Workload(rule.name, rule.what, scene, questions, rule.length, further)
+    return Workload(rule, scene, questions, further)
 
 
 def _draw_step(rule: Rule, scene: Scene, key: str, step: Stepper) -> tuple[State, float, Wall]:

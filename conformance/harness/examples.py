@@ -21,14 +21,10 @@ class Example(NamedTuple):
         built: the line that compiled it, paths left out; empty when nothing was compiled.
     """
 
-    command: tuple[str, ...]
+    command: tuple[str, ...] = ()
     why_not: str = ""
     built: str = ""
     is_absent: bool = False
-
-
-def _absent(why_not: str) -> Example:
-    return Example((), why_not, is_absent=True)
 
 
 def find_examples(folder: Path, flags: Sequence[str] = ("-O3",)) -> dict[str, Example]:
@@ -43,7 +39,7 @@ def find_examples(folder: Path, flags: Sequence[str] = ("-O3",)) -> dict[str, Ex
         "C": _build_c(folder, flags),
         "JavaScript": Example((node, str(FOLDER / "javascript" / "stepper.js")))
         if node
-        else _absent("node is not installed"),
+        else Example(why_not="node is not installed", is_absent=True),
         "Python": Example((sys.executable, str(FOLDER / "python" / "stepper.py"))),
     }
 
@@ -52,7 +48,9 @@ def find_kit_examples(folder: Path, flags: Sequence[str] = ("-O3",)) -> dict[str
     """Return the examples of the adapter kits, by what the engine gives; as `find_examples`."""
     python = FOLDER / "python"
     return {
-        "C++, next hit": _build_cpp(folder, flags),
+        "C++, next hit": compiled(
+            "C++", [*flags, "-std=c++17"], FOLDER / "cpp" / "engine.cpp", folder / "engine"
+        ),
         "Python, implicit domain": Example((sys.executable, str(python / "implicit.py"))),
         "Python, intersection and reflection": Example((sys.executable, str(python / "parts.py"))),
     }
@@ -72,11 +70,11 @@ def compiled(
     """
     compiler = next(filter(None, map(shutil.which, COMPILERS[language])), None)
     if not compiler:
-        return _absent(f"no {language} compiler is installed")
+        return Example(why_not=f"no {language} compiler is installed", is_absent=True)
     line = [compiler, *flags, "-o", str(program), str(source), *libraries]
     done = subprocess.run(line, capture_output=True, text=True, check=False)
     if done.returncode:
-        return Example((), f"it does not compile: {' '.join(done.stderr.split())[:400]}")
+        return Example(why_not=f"it does not compile: {' '.join(done.stderr.split())[:400]}")
     return Example((str(program),), built=" ".join([Path(compiler).name, *flags, source.name, *libraries]))
 
 
@@ -84,10 +82,5 @@ def _build_c(folder: Path, flags: Sequence[str]) -> Example:
     source = FOLDER / "c" / "stepper.c"
     built = compiled("C", [*flags, "-std=gnu11"], source, folder / source.stem, ["-ljansson", "-lm"])
     if "jansson.h" in built.why_not:
-        return _absent("jansson.h is not installed (Debian: libjansson-dev)")
+        return Example(why_not="jansson.h is not installed (Debian: libjansson-dev)", is_absent=True)
     return built
-
-
-def _build_cpp(folder: Path, flags: Sequence[str]) -> Example:
-    source = FOLDER / "cpp" / "engine.cpp"
-    return compiled("C++", [*flags, "-std=c++17"], source, folder / source.stem)

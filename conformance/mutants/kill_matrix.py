@@ -77,21 +77,20 @@ def diagnose(failed: Sequence[Vector], passed: Sequence[Vector]) -> list[str]:
     matrix = json.loads((DATA / "kill-matrix.json").read_bytes())["mutants"]
     ids_failed, ids_passed = ({vector.id for vector in vectors} for vectors in (failed, passed))
     some_failed, some_passed = _sample(failed), _sample(passed)
-    lines: dict[str, str] = {}
-    scores: dict[str, float] = {}
+    found: list[tuple[float, str]] = []
     for name, mutant in (MUTANTS | COMMON).items():
         own = set(matrix[name]["vectors"])
         if own & ids_passed and not own & ids_failed:
             continue
         alike, unlike = len(kills(some_failed, mutant)), len(kills(some_passed, mutant))
         shares = alike / len(some_failed), unlike / len(some_passed)
-        scores[name] = _correlation(len(failed), len(passed), *shares)
-        lines[name] = (
+        line = (
             f"like {name} on {alike} of {len(some_failed)} failures, and unlike it on {unlike} of"
             f" {len(some_passed)} passes: {mutant.fault}"
         )
-    likest = sorted(scores, key=lambda name: -scores[name])[:MAX_NAMED]
-    return [lines[name] for name in likest if scores[name] >= max(ALIKE, NEARLY * scores[likest[0]])]
+        found.append((_correlation(len(failed), len(passed), *shares), line))
+    likest = sorted(found, key=lambda one: -one[0])[:MAX_NAMED]
+    return [line for score, line in likest if score >= max(ALIKE, NEARLY * likest[0][0])]
 
 
 def _sample(vectors: Sequence[Vector]) -> list[Vector]:

@@ -109,23 +109,11 @@ def time_within_period_in_float32(
     plain(law, first + single(t - first - turns * (last - first)))
 
 
-@mutant(Flight, "law")
-def rate_without_harmonic_number(flight: Flight, plain: Plain[LawMotion], law: Law) -> LawMotion:
+@mutant(FourierMotion, "at")
+def rate_without_harmonic_number(motion: FourierMotion, plain: Plain[LawValue], s: float) -> LawValue:
     """Differentiates cos(k omega t) to -omega sin(k omega t)."""
-    return RateOfFirstHarmonic(law, flight.state.t) if isinstance(law, Fourier) else plain(law)
-
-
-class RateOfFirstHarmonic(FourierMotion):
-    """A Fourier law whose rate lacks the numbers of its harmonics."""
-
-    def __init__(self, law: Fourier, t: float) -> None:
-        super().__init__(law, t)
-        self.omega = frequency(fp, law)
-
-    def at(self, s: float) -> LawValue:
-        """Return the motion at the time s since departure."""
-        rate = sum(self.omega * (b * cos(f * s) - a * sin(f * s)) for f, a, b in self.waves)
-        return super().at(s)._replace(rate=rate)
+    rate = sum(motion.omega * (b * cos(f * s) - a * sin(f * s)) for f, a, b in motion.waves)
+    return plain(s)._replace(rate=rate)
 
 
 @mutant(FourierMotion, "__init__")

@@ -83,8 +83,8 @@ class FourierMotion:
     """A Fourier law from time t on: its waves a cos(f s) + b sin(f s) turned to begin there."""
 
     def __init__(self, law: Fourier, t: float) -> None:
-        omega = frequency(fp, law)
-        self.waves = [turned(k * omega, a, b, t) for k, a, b in law.harmonics()]
+        self.omega = frequency(fp, law)
+        self.waves = [turned(k * self.omega, a, b, t) for k, a, b in law.harmonics()]
         self.value = law.mean + sum(a for _, a, _ in self.waves)
 
     def at(self, s: float) -> LawValue:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mpmath import fp
@@ -51,7 +51,7 @@ PER_ENERGY = 20
 def circle(evidence: ClaimEvidence) -> list[Check]:
     """L1: the breathing circle, hit by hit."""
     orbits = _orbits(evidence.steppers.trajectory, evidence.seed)
-    momentum = max(orbit.momentum for row in orbits for orbit in row)
+    momentum = float(orbits["momentum"].max())
     return [
         stated(
             f"angular momentum at arc hits, {N_ORBITS} orbits: largest relative change",
@@ -61,16 +61,16 @@ def circle(evidence: ClaimEvidence) -> list[Check]:
         ),
         _orbits_exponent(
             "outgoing less incoming angle, less 2 (u/v) sin phi (eq. barph)",
-            [[o.turned for o in row] for row in orbits],
+            orbits["turned"],
             -2,
         ),
         _orbits_exponent(
             "relative change of speed at a hit, less -2 (u/v) cos phi",
-            [[o.slowed for o in row] for row in orbits],
+            orbits["slowed"],
             -2,
         ),
-        _orbits_exponent("phi' - phi per hit", [[o.step for o in row] for row in orbits], -2),
-        _orbits_exponent("drift of v r over a fixed time", [[o.product for o in row] for row in orbits], -1),
+        _orbits_exponent("phi' - phi per hit", orbits["step"], -2),
+        _orbits_exponent("drift of v r over a fixed time", orbits["product"], -1),
     ]
 
 
@@ -80,15 +80,27 @@ def impact_angle(evidence: ClaimEvidence) -> list[Check]:
     return [
         _orbits_exponent(
             f"largest change of phi_hat {what} over a fixed time",
-            [[getattr(orbit, name) for orbit in row] for row in orbits],
+            orbits[name],
             -1,
         )
         for what, name in (("at impacts", "angle"), ("half-way between impacts", "between"))
     ]
 
 
-class Orbit(NamedTuple):
-    """What changes along one orbit of the breathing circle.
+@lru_cache(maxsize=1)  # L1 and C6 look at the same
+def _orbits(follow: Callable[..., Collisions], seed: int) -> dict[str, FloatArray]:
+    """Return what changes along drawn orbits, (N_ORBITS, len(SPEEDS)) each, by the names of `_orbit`."""
+    scene = load("breathing-circle")
+    random = np.random.default_rng(run_seed(seed, RUNS["frozen-mushroom@1e8"], -3))
+    starts = random.uniform((-0.6, 0.1, 0.0), (0.6, 0.7, 2 * np.pi), size=(N_ORBITS, 3)).tolist()
+    rows = [[_orbit(follow, scene, speed, *start) for speed in SPEEDS] for start in starts]
+    return {name: np.array([[orbit[name] for orbit in row] for row in rows]) for name in rows[0][0]}
+
+
+def _orbit(
+    follow: Callable[..., Collisions], scene: Scene, speed: float, x: float, y: float, turn: float
+) -> dict[str, float]:
+    """Return what changes along one orbit of the breathing circle.
 
     momentum: largest relative change of L.
     step: root mean square of phi' - phi per hit.
@@ -97,28 +109,6 @@ class Orbit(NamedTuple):
     turned: root mean square, over hits, of the change of angle at a hit less that of eq. (barph).
     slowed: the same of the relative change of speed.
     """
-
-    momentum: float
-    step: float
-    product: float
-    angle: float
-    between: float
-    turned: float
-    slowed: float
-
-
-@lru_cache(maxsize=1)  # L1 and C6 look at the same
-def _orbits(follow: Callable[..., Collisions], seed: int) -> list[list[Orbit]]:
-    """Return drawn orbits, a row for each with its speeds in SPEEDS."""
-    scene = load("breathing-circle")
-    random = np.random.default_rng(run_seed(seed, RUNS["frozen-mushroom@1e8"], -3))
-    starts = random.uniform((-0.6, 0.1, 0.0), (0.6, 0.7, 2 * np.pi), size=(N_ORBITS, 3)).tolist()
-    return [[_orbit(follow, scene, speed, *start) for speed in SPEEDS] for start in starts]
-
-
-def _orbit(
-    follow: Callable[..., Collisions], scene: Scene, speed: float, x: float, y: float, turn: float
-) -> Orbit:
     state = State(0.0, x, y, speed * math.cos(turn), speed * math.sin(turn))
     done = follow(scene, state, int(4 * speed), DURATION)
     at_arc = np.array([wall == "arc" for wall in done.walls])
@@ -132,18 +122,18 @@ def _orbit(
     product, u_over_v = before * r, values(scene.r, t, 1) / before  # type: ignore[union-attr]
     turned = np.arcsin(momentum / (r * after)) - phi - 2 * u_over_v * np.sin(phi)
     slowed = after / before - 1 + 2 * u_over_v * np.cos(phi)
-    return Orbit(
-        float(np.max(np.abs(momentum / momentum[0] - 1))),
-        float(np.sqrt(np.mean(np.diff(phi) ** 2))),
-        float(np.max(np.abs(product / product[0] - 1))),
-        float(np.max(np.abs(phi - phi[0]))),
-        float(np.max(np.abs(flown - phi[0]))),
-        float(np.sqrt(np.mean(turned**2))),
-        float(np.sqrt(np.mean(slowed**2))),
-    )
+    return {
+        "momentum": float(np.max(np.abs(momentum / momentum[0] - 1))),
+        "step": float(np.sqrt(np.mean(np.diff(phi) ** 2))),
+        "product": float(np.max(np.abs(product / product[0] - 1))),
+        "angle": float(np.max(np.abs(phi - phi[0]))),
+        "between": float(np.max(np.abs(flown - phi[0]))),
+        "turned": float(np.sqrt(np.mean(turned**2))),
+        "slowed": float(np.sqrt(np.mean(slowed**2))),
+    }
 
 
-def _orbits_exponent(what: str, rows: list[list[float]], exponent: int) -> Check:
+def _orbits_exponent(what: str, rows: FloatArray, exponent: int) -> Check:
     """Compare the exponent of v with an expected one; its error is of the mean over orbits."""
     fits = [theory.fit_power(SPEEDS, row, np.full(len(row), 0.1), (-1.0, -2.0)).exponent for row in rows]
     return close(

@@ -28,7 +28,6 @@ from conformance.suite.process import CheckFailure
 from conformance.suite.run import N_FRESH, Transform, draw_transform
 from conformance.suite.session import Session, outcomes_of
 from conformance.suite.sheet import read_number, read_rows
-from conformance.vectors import Vector
 from mushrooms.check import format_outcome
 from mushrooms.output import announce_compilation, check_file, new_console, progress_bar
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined, from_data
@@ -53,7 +52,7 @@ def ask_case(case: str, command: list[str] | None, seed: int | None, as_json: bo
     return 0 if result.is_right else 1
 
 
-def _find(case: str, seed: int | None) -> Vector:
+def _find(case: str, seed: int | None) -> vectors.Vector:
     known = {vector.id: vector for vector in vectors.load("stress")}
     if case in known:
         return known[case]
@@ -65,7 +64,7 @@ def _find(case: str, seed: int | None) -> Vector:
     return fresh_one(seed, fresh[case])
 
 
-def _show(vector: Vector, transform: Transform) -> None:
+def _show(vector: vectors.Vector, transform: Transform) -> None:
     console = new_console(soft_wrap=True)
     condition = f", condition {vector.condition:.3g}" if vector.condition else ""
     console.print(f"[bold]{vector.id}[/], level {vector.level}{condition}")
@@ -86,7 +85,7 @@ def _show(vector: Vector, transform: Transform) -> None:
     console.print(f"verifier   {verdict.status} {escape(verdict.reason)}".rstrip())
 
 
-def _put(command: list[str], vector: Vector, transform: Transform) -> Result:
+def _put(command: list[str], vector: vectors.Vector, transform: Transform) -> Result:
     with Session(command) as session:
         try:
             session.start()

@@ -43,14 +43,13 @@ from mushrooms.figures.style import (
     ORANGE,
     SKY,
     STYLE,
-    FloatArray,
     new_figure,
     phase_colours,
     power,
 )
 from mushrooms.orbits import follow
 from scene import load
-from scene.laws import values
+from scene.laws import FloatArray, values
 from scene.tables import Mushroom, laws
 
 Panels = Any  # axes as `new_figure` returns them

@@ -12,8 +12,9 @@ from mpmath import fp
 
 import theory
 from fast.ensemble import FOLLOWED, UNDECIDED, Ensemble, one_cycle
+from mushrooms.orbits import stretches
 from mushrooms.store.spec import RunSpec
-from scene import BadInput, Cap, Mushroom, Scene, Stem
+from scene import BadInput, Mushroom, Scene
 from scene.geometry import table_at
 from scene.mouth import mouth_minima, start_time
 
@@ -122,10 +123,8 @@ def _as_first_cycles(scene: Scene, n_cycles: int) -> float:
 
 def _size(scene: Scene, t: float) -> tuple[float, float]:
     """Return a table's area [length^2] and the length of its walls [length] at a time."""
-    now: Any = table_at(fp, scene, t)
-    top = 2 * now.w if isinstance(scene, Stem) else math.pi * now.r + 2 * (now.r - now.w)
-    stem = 2 * (now.h * math.hypot(1.0, now.slope) + now.half_width(-now.h))
-    return float(now.cap_area() + now.stem_area()), float(top + (0 if isinstance(scene, Cap) else stem))
+    now = table_at(fp, scene, t)
+    return float(now.cap_area() + now.stem_area()), math.fsum(part.length for part in stretches(now))
 
 
 def careful_note(summary: Mapping[str, Any]) -> str | None:

@@ -63,7 +63,7 @@ def measure_solvers(
     if table is not None:
         measuring = {"--quick": quick or None, "COMMAND": command or None}
         refuse_unheeded(measuring, "--table measures nothing")
-        print(bench_page.to_markdown(record.read(table), workload or "moving-cap-1e7"), end="")
+        print(bench_page.to_markdown(record.read(table), workload or bench_page.HEADLINE), end="")
         return
     refuse_unheeded({"--workload": workload}, "it needs --table")
     size: Size = "quick" if quick else "full"

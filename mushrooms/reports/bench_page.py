@@ -16,7 +16,7 @@ from mushrooms.reports.page import embed, render
 from scene import BadInput
 
 ALL = "all"  # workloads, in one table
-BESIDE = "moving-cap-1e7"  # what its times are compared with
+HEADLINE = "moving-cap-1e7"  # a first look; its times are what the others are compared with
 
 
 def to_html(record: Record, speed: bytes) -> str:
@@ -79,12 +79,12 @@ def to_markdown(record: Record, workload: str) -> str:
 def _by_workload(record: Record) -> str:
     """Return what a collision takes in the lanes on each workload that they serve, beside the lean C."""
     ns = {(p.workload, p.solver): statistics.median(p.ns) for p in record.points}
-    head = ("workload", "lanes, ns per collision", f"beside {BESIDE}", "lean C over lanes")
+    head = ("workload", "lanes, ns per collision", f"beside {HEADLINE}", "lean C over lanes")
     rows = []
     for name in (w.name for w in record.workloads):
         lanes, lean = (ns.get((name, solver)) for solver in ("fast, lanes", "lean C"))
         if lanes is not None:
-            usual = ns.get((BESIDE, "fast, lanes"))
+            usual = ns.get((HEADLINE, "fast, lanes"))
             parts = [None if usual is None else lanes / usual, None if lean is None else lean / lanes]
             rows.append((name, f"{lanes:,.0f}", *("–" if x is None else f"{x:.2g}" for x in parts)))
     return _as_table(head, rows)
@@ -128,8 +128,7 @@ MARKS = {
     "example": "h",
     "command": "*",
 }
-# In one panel for a first look: a workload, and what its steppers are called.
-HEADLINE = "moving-cap-1e7"
+# What the steppers are called in one panel for a first look.
 NAMED = {
     "fast, lanes": "fast, many particles",
     "fast, a call": "fast, a call from Python",
@@ -170,7 +169,7 @@ def headline(record: Record) -> Figure:
     axes.axvline(BINARY64, color=plots.BLACK, linewidth=0.8, linestyle=":")
     for p in points:
         _mark(axes, p)
-        share = _share_wrong(p)
+        share = p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
         name = NAMED.get(p.solver, "" if p.family == "proof" else short_name(p.solver)) + (
             f",\n{100 * share:.1g} % wrong walls" if share else ""
         )
@@ -193,10 +192,6 @@ def _mark(axes: Any, p: Point) -> None:
         axes.plot([middle, middle], [first, third], color=colour, marker="_", markersize=6, linewidth=1.2)
         axes.plot([worst, middle], [ns, ns], color=colour, marker="|", markersize=7, linewidth=1.2)
         axes.plot(middle, ns, marker=MARKS[p.family], markersize=5.5, color=colour, linestyle="none")
-
-
-def _share_wrong(p: Point) -> float:
-    return p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
 
 
 def _digits_of(p: Point) -> tuple[float, float]:

@@ -37,10 +37,6 @@ class RunTally(NamedTuple):
     met: int = 0
     captured: int = 0
 
-    def merged(self, other: RunTally) -> RunTally:
-        """Return the tally of both."""
-        return RunTally(*(a + b for a, b in zip(self, other, strict=True)))
-
 
 def tally_of(found: Ensemble) -> RunTally:
     """Return the tally of an ensemble."""

@@ -8,7 +8,7 @@ captured (0 or 1), and x0, y0, where it started. The names that `mushrooms expor
 import csv
 import re
 from collections.abc import Iterable, Iterator
-from itertools import islice, pairwise
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,7 +34,7 @@ from mushrooms.figures.style import ORANGE, SKY, STYLE, new_figure, svg
 from mushrooms.output import import_arrow, writable_folder, write_report
 from mushrooms.reports.audit_page import expected_text, figures_text, power_text, to_json
 from mushrooms.reports.page import embed, pull, render
-from scene.refusal import BadInput, shown
+from scene.refusal import BadInput
 from scene.tables import Mushroom
 
 UNITS = {"v2/2": 1.0, "v2": 0.5}  # what an energy of 1 in a file is as v^2/2
@@ -327,14 +327,10 @@ def _parts(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
 def _find_columns(label: str, names: Iterable[str]) -> dict[str, list[str]]:
     """Return the columns of a table that are needed, by what they are; cycles in their order."""
     given = list(names)
-    names = sorted(given, key=lambda name: (len(name), name))
-    twice = [name for name, following in pairwise(names) if name == following]
-    found = {what: [n for n in names if re.fullmatch(form, n)] for what, form in NAMES.items()}
-    problem = f"column {shown(twice[0])} stands twice" if twice else ""
-    if not (problem or found[ENERGIES] or found[GAIN]):
-        problem = f"column 'E1' is missing, as is 's'; it has {', '.join(given[:8])}"
-    if problem:
-        raise BadInput(f"{label}: {problem}")
+    ordered = sorted(given, key=lambda name: (len(name), name))
+    found = {what: [n for n in ordered if re.fullmatch(form, n)] for what, form in NAMES.items()}
+    if not (found[ENERGIES] or found[GAIN]):
+        raise BadInput(f"{label}: column 'E1' is missing, as is 's'; it has {', '.join(given[:8])}")
     return {what: columns for what, columns in found.items() if columns}
 
 
@@ -362,7 +358,7 @@ def _parquet(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
             for batch in file.iter_batches(PART, columns=wanted):
                 columns = ((name, batch.column(name).cast("float64")) for name in wanted)
                 yield {name: column.to_numpy(zero_copy_only=False) for name, column in columns}
-    except (arrow.ArrowInvalid, arrow.ArrowNotImplementedError) as error:
+    except (arrow.ArrowInvalid, arrow.ArrowNotImplementedError, KeyError) as error:  # a name that comes twice
         raise BadInput(f"{label}: {error}") from None
 
 

@@ -23,11 +23,6 @@ def blocks(page: Path) -> list[tuple[str, str]]:
     return BLOCK.findall(page.read_text("utf-8"))
 
 
-def pages(folder: Path) -> list[Path]:
-    """List the pages in a folder that have pictures of their own."""
-    return [page for page in sorted(folder.glob("*.md")) if blocks(page)]
-
-
 def draw(page: Path, folder: Path) -> list[Path]:
     """Run the blocks of a page and write their pictures.
 

@@ -162,7 +162,15 @@ def headline(record: Record) -> Figure:
         if p.workload == workload.name and (p.solver in NAMED or p.family in ("proof", "command"))
     ]
     figure, axes = plots.new_figure(8.0, 5.0)
-    axes.set(xscale="log", yscale="log", xlim=(0.65, record.digits), ylim=(LEAST_NS, 1e8))
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlim=(0.65, record.digits),
+        ylim=(LEAST_NS, 1e8),
+        xlabel="correct digits of an answer (mark: median; bar: to the worst)",
+        ylabel="ns per collision",
+        title=f"One core, {workload.name}: {workload.what}",
+    )
     axes.set_xticks(TICKS, map(str, TICKS))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.tick_params(labelsize=LABEL)
@@ -177,11 +185,6 @@ def headline(record: Record) -> Figure:
         place, style["ha"] = PLACES.get(p.family, ((9, 0), "left"))
         axes.annotate(name, (_digits_of(p)[0], statistics.median(p.ns)), place, fontsize=LABEL + 1, **style)
     axes.text(BINARY64 * 1.04, 4e7, "binary64", fontsize=LABEL)
-    axes.set(
-        xlabel="correct digits of an answer (mark: median; bar: to the worst)",
-        ylabel="ns per collision",
-        title=f"One core, {workload.name}: {workload.what}",
-    )
     return figure
 
 

@@ -52,25 +52,29 @@ def audit_claims(
     particles: int | None,
 ) -> int:
     """Check the paper's claims, or an ensemble of another program; return the exit code."""
-    of_ensemble = {
-        "--scene": scene,
-        "--backwards": backwards,
-        "--energy": energy,
-        "--energy-unit": energy_unit,
-        "--time-unit": time_unit,
-        "--particles": particles,
-    }
     if ensemble is None:
-        refuse_unheeded(of_ensemble, "there is no --ensemble")
+        refuse_unheeded(
+            {
+                "--scene": scene,
+                "--backwards": backwards,
+                "--energy": energy,
+                "--energy-unit": energy_unit,
+                "--time-unit": time_unit,
+                "--particles": particles,
+            },
+            "there is no --ensemble",
+        )
         return _audit_paper(out, full, only, seed, threads, resume, commands, as_json)
-    of_paper = {
-        "--full": full or None,
-        "--only": only,
-        "--threads": threads,
-        "--resume": resume or None,
-        "--commands": commands or None,
-    }
-    refuse_unheeded(of_paper, "an --ensemble is audited")
+    refuse_unheeded(
+        {
+            "--full": full or None,
+            "--only": only,
+            "--threads": threads,
+            "--resume": resume or None,
+            "--commands": commands or None,
+        },
+        "an --ensemble is audited",
+    )
     options = Options(energy, energy_unit or "v2/2", time_unit, particles)
     return audit_ensemble(ensemble, scene, backwards, options, out, as_json)
 

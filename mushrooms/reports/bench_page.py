@@ -125,7 +125,6 @@ MARKS = {
     "time-stepping": "v",
     "fixed-step": "^",
     "lean": "P",
-    "example": "h",
     "command": "*",
 }
 # What the steppers are called in one panel for a first look.
@@ -205,10 +204,9 @@ def _digits_of(p: Point) -> tuple[float, float]:
 
 
 def short_name(solver: str) -> str:
-    """Return a solver's label."""
-    for part in ("proof, ", " digits", "fast, ", "solve_ivp, ", "example in ", "command ", "steps, flight"):
-        solver = solver.replace(part, "1" if part == "steps, flight" else "")
-    return plots.plain(solver if len(solver) < 18 else solver[:17] + "…")
+    """Return the label of a command that is measured too."""
+    command = solver.removeprefix("command ")
+    return plots.plain(command if len(command) < 18 else command[:17] + "…")
 
 
 @rc_context(plots.STYLE)

@@ -373,13 +373,12 @@ def open_run(folder: Path) -> StoredRun:
     return run
 
 
-TIMES = ("seconds", "threads")
-
-
 def write_npz(run: StoredRun, file: BinaryIO) -> None:
     """Write the fields of `fast.Ensemble` (times left out) as numpy reads them."""
     fields = run.ensemble(run.shape.n_particles)._asdict()
-    held = {name: array for name, array in fields.items() if np.size(array) and name not in TIMES}
+    held = {
+        name: array for name, array in fields.items() if np.size(array) and name not in ("seconds", "threads")
+    }
     np.savez(file, **held)
 
 

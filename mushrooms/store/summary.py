@@ -113,8 +113,7 @@ def _as_first_cycles(scene: Scene, n_cycles: int) -> float:
     if n_cycles <= 1 or not isinstance(scene, Mushroom):
         return n_cycles
     growth = float(theory.mean_of(scene, lambda s: s.context.exp(s / 2), 5))
-    n = min(n_cycles, MOST_CYCLES)
-    return max(float(n_cycles), math.fsum(growth**k for k in range(n)))
+    return max(float(n_cycles), math.fsum(growth**k for k in range(min(n_cycles, MOST_CYCLES))))
 
 
 def _size(scene: Scene, t: float) -> tuple[float, float]:
@@ -173,8 +172,7 @@ def measured(spec: RunSpec, n_captured: int, gain: Gain) -> dict[str, Any]:
     """
     n, k = gain.n, spec.n_cycles
     mean, error = (None if x is None else x / k for x in (gain.mean, gain.standard_error))
-    has_island = isinstance(spec.scene, Mushroom)
-    free = 1.0 - n_captured / (n * k) if n and has_island else None
+    free = 1.0 - n_captured / (n * k) if n and isinstance(spec.scene, Mushroom) else None
     free_error = None if free is None else _measured_error(spec.scene, free, n * k)
     found = predicted(spec)
     m1_z = p_nc_z = None

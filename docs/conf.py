@@ -126,7 +126,7 @@ def draw_gallery(app: Any) -> None:
     """Make the pictures of the pages; those that are there are kept until docs/generated/ is deleted."""
     from mushrooms import gallery
 
-    for page in gallery.pages(DOCS):
+    for page in DOCS.glob("*.md"):
         if not all((DOCS / "generated" / name).exists() for name, _ in gallery.blocks(page)):
             gallery.draw(page, DOCS / "generated")
 

@@ -9,8 +9,6 @@ from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
 
-from rich import progress
-
 import fast
 from conformance.audit import session
 from conformance.audit.claim import AuditSteppers, Claim
@@ -18,7 +16,6 @@ from conformance.audit.claims import all_claims, select_claims
 from conformance.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
 from conformance.audit.session import AuditResult, AuditSettings
 from conformance.files import named
-from fast import Ensemble
 from fast.ensemble import SHARE
 from mushrooms.audit_ensemble import Options, audit_ensemble
 from mushrooms.output import (
@@ -55,25 +52,29 @@ def audit_claims(
     particles: int | None,
 ) -> int:
     """Check the paper's claims, or an ensemble of another program; return the exit code."""
-    of_ensemble = {
-        "--scene": scene,
-        "--backwards": backwards,
-        "--energy": energy,
-        "--energy-unit": energy_unit,
-        "--time-unit": time_unit,
-        "--particles": particles,
-    }
     if ensemble is None:
-        refuse_unheeded(of_ensemble, "there is no --ensemble")
+        refuse_unheeded(
+            {
+                "--scene": scene,
+                "--backwards": backwards,
+                "--energy": energy,
+                "--energy-unit": energy_unit,
+                "--time-unit": time_unit,
+                "--particles": particles,
+            },
+            "there is no --ensemble",
+        )
         return _audit_paper(out, full, only, seed, threads, resume, commands, as_json)
-    of_paper = {
-        "--full": full or None,
-        "--only": only,
-        "--threads": threads,
-        "--resume": resume or None,
-        "--commands": commands or None,
-    }
-    refuse_unheeded(of_paper, "an --ensemble is audited")
+    refuse_unheeded(
+        {
+            "--full": full or None,
+            "--only": only,
+            "--threads": threads,
+            "--resume": resume or None,
+            "--commands": commands or None,
+        },
+        "an --ensemble is audited",
+    )
     options = Options(energy, energy_unit or "v2/2", time_unit, particles)
     return audit_ensemble(ensemble, scene, backwards, options, out, as_json)
 
@@ -118,12 +119,13 @@ def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -
     check_runs(folder, needed(claims, settings.size), settings.seed, settings.resume)
     try:
         with announce_compilation(), progress_bar() as bar:
+            watch_of = cache(partial(Watch, bar, unit="particles"))
             return session.conduct(
                 AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
                 settings,
                 claims=claims,
                 simulate_run=lambda name: partial(follow_run, folder / FOLDER / name, settings.resume),
-                progress=_watch_runs(bar),
+                progress=lambda run, n_total, n_done: watch_of(run).update(n_done, n_total),
             )
     except (KeyboardInterrupt, OSError) as error:
         error.add_note("finished parts are in the folder of the report: --resume continues the audit")
@@ -142,12 +144,6 @@ def _check_report(folder: Path, wanted: set[str]) -> None:
             f"output {str(folder)!r} has a report of {len(there)} claims, size = {report.get('size')!r} and"
             f" seed = {report.get('seed')}; {len(wanted)} are asked for: with --resume none is given up"
         )
-
-
-def _watch_runs(bar: progress.Progress) -> Callable[[str, int, int], None]:
-    """Return what moves a bar for each run."""
-    watch_of = cache(partial(Watch, bar, unit="particles"))
-    return lambda run, n_total, n_done: watch_of(run).update(n_done, n_total)
 
 
 FOLDER = "runs"
@@ -204,7 +200,7 @@ def follow_run(
     threads: int | None,
     phases: tuple[float, ...],
     progress: Callable[[int], None],
-) -> Ensemble:
+) -> fast.Ensemble:
     """Return what `fast.simulate` would, and follow only what the run's folder lacks."""
     spec = RunSpec(scene, energy, n_cycles, seed, phases)
     default = block_size(spec, n_particles, threads or os.cpu_count() or 1)

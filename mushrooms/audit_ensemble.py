@@ -8,12 +8,11 @@ captured (0 or 1), and x0, y0, where it started. The names that `mushrooms expor
 import csv
 import re
 from collections.abc import Iterable, Iterator
-from itertools import islice, pairwise
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import zarr
 from matplotlib import rc_context
 
@@ -28,19 +27,16 @@ from conformance.audit.ensemble import (
     likely_causes,
     reversal,
 )
-from conformance.audit.runs import scene_named
+from conformance.audit.runs import BoolArray, FloatArray, scene_named
 from conformance.suite.sheet import read_number, read_rows
-from mushrooms import output
 from mushrooms.figures import energies
 from mushrooms.figures.style import ORANGE, SKY, STYLE, new_figure, svg
-from mushrooms.output import import_arrow
-from mushrooms.reports import audit_page
-from mushrooms.reports.audit_page import expected_text, figures_text, power_text
+from mushrooms.output import import_arrow, writable_folder, write_report
+from mushrooms.reports.audit_page import expected_text, figures_text, power_text, to_json
 from mushrooms.reports.page import embed, pull, render
-from scene.refusal import BadInput, shown
+from scene.refusal import BadInput
 from scene.tables import Mushroom
 
-Floats = npt.NDArray[np.float64]
 UNITS = {"v2/2": 1.0, "v2": 0.5}  # what an energy of 1 in a file is as v^2/2
 TIMES = ("scene", "cycles")
 TOUCH = 0.05  # of a cycle, by which times may lie outside the capture that theory has
@@ -49,7 +45,6 @@ SAME = 1e-6  # relative difference of E0 that writing it in few digits makes
 NOTHING = ("", "nan", "NaN", "NA", "null", "none", "None")
 FLAGS = {"true": "1", "false": "0", "t": "1", "f": "0", "yes": "1", "no": "0"}
 N_BINS = 50
-MOST_DRAWN = 1_000_000  # values that a histogram is of; of more, evenly spaced ones
 SIGNS = {True: ("✓", "good"), False: ("✗", "bad"), None: ("?", "open")}
 WORDS = {True: "holds", False: "FAILS", None: "open"}
 ENERGIES, GAIN = "E1", "s"
@@ -103,12 +98,10 @@ def audit_ensemble(
         raise BadInput(f"--energy-unit = {options.energy_unit!r}, must be one of {', '.join(UNITS)}")
     if options.time_unit not in (None, *TIMES):
         raise BadInput(f"--time-unit = {options.time_unit!r}, must be one of {', '.join(TIMES)}")
-    with output.writable_folder(out) as folder:
+    with writable_folder(out) as folder:
         result = examine(path, found, reversed_path, options)
         data = to_data(result, path, scene_name)
-        output.write_report(
-            folder, audit_page.to_json(data), to_text(data), to_html(data, result.given), as_json
-        )
+        write_report(folder, to_json(data), to_text(data), to_html(data, result.given), as_json)
     return 0 if result.verdict == "confirmed" else 1
 
 
@@ -192,13 +185,12 @@ def to_data(result: EnsembleAudit, path: Path, scene_name: str) -> dict[str, Any
 
 def to_html(data: dict[str, Any], given: GivenEnsemble) -> str:
     """Return the page."""
-    gain = given.s[:: 1 + (len(given.s) - 1) // MOST_DRAWN]
     times = capture_times(given)
     return render(
         "ensemble.html.jinja",
         report=data,
         signs=SIGNS,
-        energies=embed(svg(energies.histogram(given.scene, given.energy, gain))),
+        energies=embed(svg(energies.histogram(given.scene, given.energy, given.s))),
         times=embed(times) if times else None,
     )
 
@@ -256,7 +248,7 @@ def read_table(path: Path, scene: Mushroom, energy: float | None, unit: float) -
         BadInput: in one line, naming the column or the place.
     """
     label, n_lost, n_other, is_binary32 = f"--ensemble {str(path)!r}", 0, 0, True
-    kept: dict[str, list[Floats]] = {"sums": []}
+    kept: dict[str, list[FloatArray]] = {"sums": []}
     one = energy
     for part in _parts(path, label):
         start = np.full(len(next(iter(part.values()))), energy, float)
@@ -300,7 +292,7 @@ def read_table(path: Path, scene: Mushroom, energy: float | None, unit: float) -
     return given, n_other
 
 
-def _is_start(label: str, start: Floats, energy: float, *, is_asked: bool) -> npt.NDArray[np.bool_]:
+def _is_start(label: str, start: FloatArray, energy: float, *, is_asked: bool) -> BoolArray:
     """Tell which rows have an E0; all must, unless it was asked for."""
     bad = start[~(np.isfinite(start) & (start > 0))]
     if len(bad):
@@ -314,7 +306,7 @@ def _is_start(label: str, start: Floats, energy: float, *, is_asked: bool) -> np
     return np.asarray(found)
 
 
-def _parts(path: Path, label: str) -> Iterator[dict[str, Floats]]:
+def _parts(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
     """Yield parts of a table by what its columns are: (n, K) the energies after K cycles, (n,) all others."""
     readers = {".csv": _csv, ".parquet": _parquet, ".zarr": _zarr}
     path = path / "ensemble.zarr" if (path / "ensemble.zarr").is_dir() else path
@@ -335,14 +327,10 @@ def _parts(path: Path, label: str) -> Iterator[dict[str, Floats]]:
 def _find_columns(label: str, names: Iterable[str]) -> dict[str, list[str]]:
     """Return the columns of a table that are needed, by what they are; cycles in their order."""
     given = list(names)
-    names = sorted(given, key=lambda name: (len(name), name))
-    twice = [name for name, following in pairwise(names) if name == following]
-    found = {what: [n for n in names if re.fullmatch(form, n)] for what, form in NAMES.items()}
-    problem = f"column {shown(twice[0])} stands twice" if twice else ""
-    if not (problem or found[ENERGIES] or found[GAIN]):
-        problem = f"column 'E1' is missing, as is 's'; it has {', '.join(given[:8])}"
-    if problem:
-        raise BadInput(f"{label}: {problem}")
+    ordered = sorted(given, key=lambda name: (len(name), name))
+    found = {what: [n for n in ordered if re.fullmatch(form, n)] for what, form in NAMES.items()}
+    if not (found[ENERGIES] or found[GAIN]):
+        raise BadInput(f"{label}: column 'E1' is missing, as is 's'; it has {', '.join(given[:8])}")
     return {what: columns for what, columns in found.items() if columns}
 
 
@@ -350,8 +338,11 @@ def _select_columns(label: str, names: Iterable[str]) -> list[str]:
     return [name for columns in _find_columns(label, names).values() for name in columns]
 
 
-def _csv(path: Path, label: str) -> Iterator[dict[str, Floats]]:
-    """Yield parts of a CSV file: by Arrow where it is installed and numbers are decimal, else by cells."""
+def _csv(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
+    """Yield parts of a CSV file: by Arrow where it is installed and numbers are decimal, else by cells.
+
+    Of a million rows of two columns Arrow takes half a second, the reader by cells four.
+    """
     with path.open(encoding="utf-8-sig", newline="") as file:
         header = [name.strip() for name in next(csv.reader(file), [])]
     wanted, n_done = _select_columns(label, header), 0
@@ -365,7 +356,7 @@ def _csv(path: Path, label: str) -> Iterator[dict[str, Floats]]:
         for batch in arrow.open_csv(path, reading, convert_options=options):
             yield {name: batch.column(name).to_numpy(zero_copy_only=False) for name in wanted}
             n_done += len(batch)
-    except (ImportError, ValueError):  # the cells tell what is wrong, and where
+    except (ImportError, ValueError, KeyError):  # the cells tell what is wrong, and where
         rows = islice(read_rows(path, label, wanted), n_done, None)
         while some := list(islice(rows, FEW)):
             yield {name: np.array([_cell(place, name, row[name]) for place, row in some]) for name in wanted}
@@ -375,7 +366,7 @@ def _cell(place: str, name: str, word: str) -> float:
     return float("nan") if word in NOTHING else read_number(place, name, FLAGS.get(word.lower(), word))
 
 
-def _parquet(path: Path, label: str) -> Iterator[dict[str, Floats]]:
+def _parquet(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
     arrow, parquet = import_arrow()
     try:
         with parquet.ParquetFile(path) as file:
@@ -383,11 +374,11 @@ def _parquet(path: Path, label: str) -> Iterator[dict[str, Floats]]:
             for batch in file.iter_batches(PART, columns=wanted):
                 columns = ((name, batch.column(name).cast("float64")) for name in wanted)
                 yield {name: column.to_numpy(zero_copy_only=False) for name, column in columns}
-    except (arrow.ArrowInvalid, arrow.ArrowNotImplementedError) as error:
+    except (arrow.ArrowInvalid, arrow.ArrowNotImplementedError, KeyError) as error:  # a name that comes twice
         raise BadInput(f"{label}: {error}") from None
 
 
-def _zarr(path: Path, label: str) -> Iterator[dict[str, Floats]]:
+def _zarr(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
     try:
         group: Any = zarr.open_group(path, mode="r")
     except (OSError, ValueError, KeyError) as error:

@@ -29,7 +29,7 @@ from conformance.bench.solvers import (
 )
 from conformance.bench.workloads import FLIGHTS, Workload
 from conformance.cases.certify import Links, collided, proved_step
-from conformance.files import Writer, write_files
+from conformance.files import write_files
 from conformance.grading.agreement import Answer, Enclosed, exact
 from conformance.harness.examples import find_examples
 from conformance.suite.process import CheckFailure
@@ -61,21 +61,22 @@ def measure_solvers(
 ) -> None:
     """Measure speed against error and write it into a folder; or print a table of an earlier benchmark."""
     if table is not None:
-        measuring = {"--quick": quick or None, "COMMAND": command or None}
-        refuse_unheeded(measuring, "--table measures nothing")
-        print(bench_page.to_markdown(record.read(table), workload or "moving-cap-1e7"), end="")
+        refuse_unheeded({"--quick": quick or None, "COMMAND": command or None}, "--table measures nothing")
+        print(bench_page.to_markdown(record.read(table), workload or bench_page.HEADLINE), end="")
         return
     refuse_unheeded({"--workload": workload}, "it needs --table")
     size: Size = "quick" if quick else "full"
     with writable_folder(out) as folder, announce_compilation():
         found = _measure(size, seed, command)
         picture = style.svg(bench_page.headline(found))
-        files: dict[str, bytes | str | Writer] = {
-            "bench.json": record.encode(found),
-            "bench.svg": picture,
-            "bench.html": bench_page.to_html(found, picture),
-        }
-        write_files(folder, files)
+        write_files(
+            folder,
+            {
+                "bench.json": record.encode(found),
+                "bench.svg": picture,
+                "bench.html": bench_page.to_html(found, picture),
+            },
+        )
     for drawn in found.workloads:
         print(f"{drawn.name}\n\n{bench_page.to_markdown(found, drawn.name)}")
     for name, why in found.not_run.items():

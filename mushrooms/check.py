@@ -49,12 +49,14 @@ def check_stepper(
     """Grade a stepper or a file of answers, or write a file of questions; return the exit code."""
     files = _report_files(reports_asked)
     if questions or answers:
-        unheeded: dict[str, object] = {
-            "COMMAND": command or None,
-            "--groups": groups or None,
-            "--known-failures": known_failures,
-        }
-        refuse_unheeded(unheeded, "questions and answers are in files")
+        refuse_unheeded(
+            {
+                "COMMAND": command or None,
+                "--groups": groups or None,
+                "--known-failures": known_failures,
+            },
+            "questions and answers are in files",
+        )
     if answers:
         run = grade_file(answers, questions, level, seed)
     elif questions:

@@ -215,22 +215,6 @@ Phases = Annotated[
         metavar="A,B,...", help="Fractions of a cycle at which energies are stored too; needs --out."
     ),
 ]
-Resume = Annotated[
-    bool,
-    typer.Option(
-        "--resume",
-        help="Continue the run in DIR; with more --particles or more --cycles, extend it.",
-    ),
-]
-Dask = Annotated[
-    str | None,
-    typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers simulate the blocks."),
-]
-Block = Annotated[
-    int | None, whole("Particles stored at a time; default: some seconds of work.", 1, LARGEST_BLOCK)
-]
-Plot = Annotated[Path | None, file("Draw the energies after each cycle, with the theory (.svg, .png).")]
-Threads = Annotated[int | None, whole("Threads; default: all cores, or one per block with --dask.", 1)]
 
 
 @app.command(
@@ -246,15 +230,29 @@ def simulate(
     out: Annotated[
         Path | None, file("Folder for the run (ensemble.zarr) and summary.json.", metavar="DIR")
     ] = None,
-    resume: Resume = False,
-    dask: Dask = None,
-    block: Block = None,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume", help="Continue the run in DIR; with more --particles or more --cycles, extend it."
+        ),
+    ] = False,
+    dask: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers simulate the blocks."),
+    ] = None,
+    block: Annotated[
+        int | None, whole("Particles stored at a time; default: some seconds of work.", 1, LARGEST_BLOCK)
+    ] = None,
     max_collisions: Annotated[
         int | None, whole("Stop if a particle makes more collisions than this.", 1)
     ] = None,
     max_seconds: Annotated[float | None, positive("Stop after this time; --resume continues.")] = None,
-    plot: Plot = None,
-    threads: Threads = None,
+    plot: Annotated[
+        Path | None, file("Draw the energies after each cycle, with the theory (.svg, .png).")
+    ] = None,
+    threads: Annotated[
+        int | None, whole("Threads; default: all cores, or one per block with --dask.", 1)
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Simulate an ensemble. Undecided particles are counted, never guessed.

@@ -23,29 +23,18 @@ def blocks(page: Path) -> list[tuple[str, str]]:
     return BLOCK.findall(page.read_text("utf-8"))
 
 
-def pages(folder: Path) -> list[Path]:
-    """List the pages in a folder that have pictures of their own."""
-    return [page for page in sorted(folder.glob("*.md")) if blocks(page)]
-
-
-def draw(page: Path, folder: Path) -> list[Path]:
+def draw(page: Path, folder: Path) -> None:
     """Run the blocks of a page and write their pictures.
 
     Args:
         page: a Markdown file.
         folder: for the pictures; made if it is missing.
-
-    Returns:
-        The files written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     names: dict[str, Any] = {}
-    written = []
     for name, code in blocks(page):
         exec(compile(code, f"{page.name}: {name}", "exec"), names)
         picture = names.pop("figure")
         if isinstance(picture, Figure):
             picture = partial(style.save, picture, suffix=Path(name).suffix)
         write_file(folder / name, picture)
-        written.append(folder / name)
-    return written

@@ -19,8 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mushrooms.orbits import FloatArray, FollowedOrbit
+from mushrooms.orbits import FollowedOrbit
 from scene import BadInput, Undecided
+from scene.laws import FloatArray
 
 N_BLOCKS = 16
 DIGITS = 16

@@ -29,11 +29,10 @@ from fast.validation import check_energy
 from mushrooms.output import TABLES, check_file
 from scene import Outcome, Scene, State, Stem, Wall, check_scene
 from scene.geometry import TableAt, table_at
-from scene.laws import is_constant, values
+from scene.laws import FloatArray, is_constant, values
 from scene.mouth import start_time
 from scene.refusal import BadInput, check_count, check_number, check_seed
 
-FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 MAX_COLLISIONS = 1_000_000
 MAX_ORBITS = 1000
@@ -284,7 +283,7 @@ class Slot(NamedTuple):
     end: float
 
 
-class _Stretch(NamedTuple):
+class Stretch(NamedTuple):
     """A wall, or its part beside the mouth, from one end to the other, anticlockwise."""
 
     wall: Wall
@@ -303,27 +302,27 @@ class _Stretch(NamedTuple):
         return min(math.dist(self.begin, (x, y)) / (self.length or 1.0), 1.0)
 
 
-def _stretches(now: TableAt) -> list[_Stretch]:
+def stretches(now: TableAt) -> list[Stretch]:
     """Return the walls anticlockwise from the right end of the cap."""
     r, w, foot, h = map(float, (now.r, now.w, now.half_width(-now.h), now.h))
     stem = [
-        _Stretch("left", (-w, 0.0), (-foot, -h)),
-        _Stretch("floor", (-foot, -h), (foot, -h)),
-        _Stretch("right", (foot, -h), (w, 0.0)),
+        Stretch("left", (-w, 0.0), (-foot, -h)),
+        Stretch("floor", (-foot, -h), (foot, -h)),
+        Stretch("right", (foot, -h), (w, 0.0)),
     ]
     if isinstance(now.scene, Stem):
-        return [_Stretch("base", (w, 0.0), (-w, 0.0)), *stem]
-    arc = _Stretch("arc", (r, 0.0), (-r, 0.0))
+        return [Stretch("base", (w, 0.0), (-w, 0.0)), *stem]
+    arc = Stretch("arc", (r, 0.0), (-r, 0.0))
     if isinstance(now.scene, scenes.Cap):
-        return [arc, _Stretch("base", (-r, 0.0), (r, 0.0))]
-    return [arc, _Stretch("base", (-r, 0.0), (-w, 0.0)), *stem, _Stretch("base", (w, 0.0), (r, 0.0))]
+        return [arc, Stretch("base", (-r, 0.0), (r, 0.0))]
+    return [arc, Stretch("base", (-r, 0.0), (-w, 0.0)), *stem, Stretch("base", (w, 0.0), (r, 0.0))]
 
 
 def boundary(scene: Scene) -> list[Slot]:
     """Return the walls anticlockwise from the right end of the cap, by their mean lengths in a cycle."""
     check_scene(scene)
     times = scene.period * np.arange(N_PHASES if scene.period else 1) / N_PHASES
-    found = [_stretches(table_at(fp, scene, t)) for t in times.tolist()]
+    found = [stretches(table_at(fp, scene, t)) for t in times.tolist()]
     ends = np.cumsum([0.0, *np.mean([[part.length for part in one] for one in found], axis=0)])
     ends /= ends[-1]
     walls = [part.wall for part in found[0]]
@@ -340,7 +339,7 @@ def boundary_map(orbit: FollowedOrbit) -> FloatArray:
     out = np.empty((len(orbit.walls), 2))
     for k, (wall, (_, t, x, y, vx, vy)) in enumerate(zip(orbit.walls, orbit.steps.tolist(), strict=True)):
         now = table_at(fp, orbit.scene, t)
-        own = [pair for pair in zip(slots, _stretches(now), strict=True) if pair[0].wall == wall]
+        own = [pair for pair in zip(slots, stretches(now), strict=True) if pair[0].wall == wall]
         slot, part = own[0 if x < 0 else -1]  # of the base beside a mouth the left part comes first
         normal_x, normal_y = now.normal(wall, x, y)
         # Anticlockwise along the wall: the inward normal turned by a right angle, clockwise.

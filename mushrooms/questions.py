@@ -28,7 +28,6 @@ from conformance.suite.process import CheckFailure
 from conformance.suite.run import N_FRESH, Transform, draw_transform
 from conformance.suite.session import Session, outcomes_of
 from conformance.suite.sheet import read_number, read_rows
-from conformance.vectors import Vector
 from mushrooms.check import format_outcome
 from mushrooms.output import announce_compilation, check_file, new_console, progress_bar
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined, from_data
@@ -53,7 +52,7 @@ def ask_case(case: str, command: list[str] | None, seed: int | None, as_json: bo
     return 0 if result.is_right else 1
 
 
-def _find(case: str, seed: int | None) -> Vector:
+def _find(case: str, seed: int | None) -> vectors.Vector:
     known = {vector.id: vector for vector in vectors.load("stress")}
     if case in known:
         return known[case]
@@ -65,7 +64,7 @@ def _find(case: str, seed: int | None) -> Vector:
     return fresh_one(seed, fresh[case])
 
 
-def _show(vector: Vector, transform: Transform) -> None:
+def _show(vector: vectors.Vector, transform: Transform) -> None:
     console = new_console(soft_wrap=True)
     condition = f", condition {vector.condition:.3g}" if vector.condition else ""
     console.print(f"[bold]{vector.id}[/], level {vector.level}{condition}")
@@ -86,7 +85,7 @@ def _show(vector: Vector, transform: Transform) -> None:
     console.print(f"verifier   {verdict.status} {escape(verdict.reason)}".rstrip())
 
 
-def _put(command: list[str], vector: Vector, transform: Transform) -> Result:
+def _put(command: list[str], vector: vectors.Vector, transform: Transform) -> Result:
     with Session(command) as session:
         try:
             session.start()
@@ -96,14 +95,13 @@ def _put(command: list[str], vector: Vector, transform: Transform) -> Result:
         return ask_vector(session, vector, transform)
 
 
-CHOICES = ("reference", "fast", "both")
 SLOWEST = 10.0  # seconds that one question may take the reference: its work is bounded
 
 
 def attack_steppers(family: str, cases: int, seed: int, stepper: str, json_file: Path | None) -> int:
     """Ask steppers the questions of one family or of all, print the counts, and return the exit code."""
-    if stepper not in CHOICES:
-        raise BadInput(f"--stepper = {stepper!r}, must be one of {', '.join(CHOICES)}")
+    if stepper not in STEPPERS:
+        raise BadInput(f"--stepper = {stepper!r}, must be one of {', '.join(STEPPERS)}")
     names = list(FAMILIES) if family == "all" else [family]
     if family != "all" and family not in FAMILIES:
         raise BadInput(f"--family = {family!r}, must be all or one of {', '.join(FAMILIES)}")
@@ -114,20 +112,13 @@ def attack_steppers(family: str, cases: int, seed: int, stepper: str, json_file:
             [FAMILIES[name] for name in names],
             cases,
             seed,
-            steppers(stepper),
+            STEPPERS[stepper],
             progress=lambda _: bar.advance(task),
         )
     _print(tallies)
     if json_file is not None:
         write_file(json_file, json.dumps([_row(tally) for tally in tallies], indent=1) + "\n")
     return int(any(tally.cases["wrong"] or tally.slowest > SLOWEST for tally in tallies))
-
-
-def steppers(choice: str) -> UnderAttack:
-    """Return what "reference", "fast" or "both" puts under attack."""
-    if choice == "reference":
-        return UnderAttack()
-    return UnderAttack(fast.next_collision, count_hits, is_proved=choice == "both")
 
 
 def count_hits(scene: Scene, state: State, t_end: float) -> dict[str, int] | None:
@@ -139,6 +130,13 @@ def count_hits(scene: Scene, state: State, t_end: float) -> dict[str, int] | Non
     if not isinstance(carried.outcomes[0], Horizon | Undefined):
         return None
     return dict(zip(Mushroom.walls, map(int, carried.wall_counts[0]), strict=True))
+
+
+STEPPERS = {
+    "reference": UnderAttack(),
+    "fast": UnderAttack(fast.next_collision, count_hits, is_proved=False),
+    "both": UnderAttack(fast.next_collision, count_hits),
+}
 
 
 def _row(tally: Any) -> dict[str, Any]:

@@ -59,15 +59,17 @@ def simulate_scene(
     if out is None:
         if particles > MOST_IN_MEMORY:
             raise BadInput(f"--particles = {particles}, must be 1 to {MOST_IN_MEMORY}; more need --out")
-        of_stored: dict[str, object] = {
-            "--phases": phases,
-            "--resume": resume or None,
-            "--dask": dask,
-            "--block": block,
-            "--max-collisions": max_collisions,
-            "--max-seconds": max_seconds,
-        }
-        refuse_unheeded(of_stored, "it needs --out, as without a folder nothing is kept")
+        refuse_unheeded(
+            {
+                "--phases": phases,
+                "--resume": resume or None,
+                "--dask": dask,
+                "--block": block,
+                "--max-collisions": max_collisions,
+                "--max-seconds": max_seconds,
+            },
+            "it needs --out, as without a folder nothing is kept",
+        )
     if plot is not None and particles < 2:
         raise BadInput(f"--particles = {particles}, must be >= 2 for --plot")
     check_file(plot, (".svg", ".png"))
@@ -81,12 +83,14 @@ def simulate_scene(
             if dask
             else partial(conduct.in_process, threads=threads)
         )
-        limits: dict[str, Any] = {"max_collisions": max_collisions, "max_seconds": max_seconds}
         default = conduct.block_of_new(spec, particles, threads or os.cpu_count() or 1)
         with writable_folder(out), locked(out):
             with named(out), announce_compilation():
                 run = conduct.open_or_create(out, spec, particles, block, default, scene, resume)
-            summary, gains = _on_disk(run, name, partial(conduct.complete, run, engine, **limits))
+            complete = partial(
+                conduct.complete, run, engine, max_collisions=max_collisions, max_seconds=max_seconds
+            )
+            summary, gains = _on_disk(run, name, complete)
     print_pairs(summary, as_json)
     tell(careful_note(summary))
     tell(explain_limit(spec, summary))

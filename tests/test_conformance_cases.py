@@ -45,7 +45,7 @@ from conformance.vectors import (
     request,
 )
 from conformance.verify import Verdict
-from mushrooms.questions import steppers
+from mushrooms.questions import STEPPERS
 from scene import State, catalogue, from_data, load
 from scene.protocol.messages import Command
 
@@ -80,7 +80,7 @@ USUAL = sorted({"growing-stem", "steep", *(name for name, _, _ in KILLS)})
 
 @pytest.mark.parametrize("name", deep_but(FAMILIES, *USUAL))
 def test_our_steppers_survive(name, tally):
-    (found,) = run([FAMILIES[name]], N_ATTACKS, SEED, steppers("both"))
+    (found,) = run([FAMILIES[name]], N_ATTACKS, SEED, STEPPERS["both"])
     tally.update(found.counts)
     assert found.cases["wrong"] == []
     assert found.slowest < 10.0

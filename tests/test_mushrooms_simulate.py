@@ -78,7 +78,7 @@ def fresh(tmp_path):
         (IN_MEMORY, fast, "simulate"),
         (["audit", "--out"], session, "conduct"),
         (["bench", "--quick", "--out"], bench, "_measure"),
-        (["attack", "--cases", 1, "--json"], questions, "steppers"),
+        (["attack", "--cases", 1, "--json"], questions, "run"),
         (["draw", "ergodic", "--trajectory"], orbits, "follow"),
     ],
 )

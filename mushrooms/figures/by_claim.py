@@ -30,7 +30,6 @@ from conformance.audit.claims.finite_energy import (
     width,
     zone_energy,
 )
-from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import Mean, mean, share
 from mushrooms.figures.energies import draw, draw_adiabatic, gathered, with_residuals
@@ -43,14 +42,13 @@ from mushrooms.figures.style import (
     ORANGE,
     SKY,
     STYLE,
-    FloatArray,
     new_figure,
     phase_colours,
     power,
 )
 from mushrooms.orbits import follow
-from scene import load
-from scene.laws import values
+from scene import Scene, load
+from scene.laws import FloatArray, values
 from scene.tables import Mushroom, laws
 
 Panels = Any  # axes as `new_figure` returns them
@@ -67,7 +65,7 @@ def loops(panels: Panels) -> None:
     panels[0].set(xlabel="half-width w", ylabel="depth h", title="fixed cap, anticlockwise")
     titles = ("fixed cap, anticlockwise", "moving cap")
     for panel, scene, title in zip(panels[1:], (fixed, moving), titles, strict=True):
-        _loop(panel, *(np.array([*values, values[0]]) for values in volume_loop(scene, N_LOOP)))
+        _loop(panel, *_volume_shares(scene, np.linspace(0, scene.period, N_LOOP + 1)))
         panel.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=title)
     panels[2].legend(loc="best", title="t / T")
 
@@ -103,21 +101,21 @@ def retraced(panels: Panels, sample: Sample) -> None:
     left, right = panels
     scene = scene_of(sample.run)
     assert isinstance(scene, Mushroom)
-    left.plot(*volume_loop(scene, N_LOOP), color=BLACK, linewidth=1.2)
+    left.plot(*_volume_shares(scene, np.linspace(0, scene.period, N_LOOP)), color=BLACK, linewidth=1.2)
     curve = theory.capture_curve(scene, 4 * N_PHASES + 1)
     first = curve.t_in < curve.t_out.min()  # on the way back captures and releases change places
     t_in, t_out = curve.t_in[first], curve.t_out[first]
     for colour, label, times in ((BLUE, "captures", t_in), (ORANGE, "releases", t_out)):
-        left.plot(*_places(scene, times), "o", color=colour, markersize=5, label=label)
+        left.plot(*_volume_shares(scene, times), "o", color=colour, markersize=5, label=label)
     for pair in zip(t_in, t_out, strict=True):
-        left.plot(*_places(scene, np.array(pair)), color=BLUE, linewidth=0.8, linestyle=":")
+        left.plot(*_volume_shares(scene, np.array(pair)), color=BLUE, linewidth=0.8, linestyle=":")
     left.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=f"{sample.run.scene}, the way there")
     left.legend(loc="best")
     _energies(right, None, sample)
     right.legend(loc="upper right", fontsize=7)
 
 
-def _places(scene: Mushroom, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _volume_shares(scene: Scene, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return V_ell/V_cap and V_cap/V at times."""
     now = theory.volumes_at(np, scene, times)
     return now.v_ell / now.v_cap, now.v_cap / (now.v_cap + now.v_stem)

@@ -20,11 +20,11 @@ from matplotlib.figure import Figure
 
 import theory
 from fast.validation import check_energy
-from mushrooms.figures import style as plots
-from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, FloatArray, new_figure
+from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, new_figure, plain, power
 from mushrooms.store.spec import RunSpec
 from mushrooms.store.summary import NO_THEORY, begins_widest, known, predicted
 from scene import Mushroom, Scene, check_scene
+from scene.laws import FloatArray
 from scene.refusal import BadInput, shown
 
 IntArray = npt.NDArray[np.int64]
@@ -182,7 +182,7 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
 def _title(scene: Scene, energy: float, bars: Gathered, n_particles: int | None) -> str:
     """Return the title: scene, energy, particles, and how many of these are not drawn."""
     n = n_particles or bars.n
-    title = f"{plots.plain(scene.name or 'a scene')}, E0 = {plots.power(energy)}, {n:,} particles"
+    title = f"{plain(scene.name or 'a scene')}, E0 = {power(energy)}, {n:,} particles"
     return title if n == bars.n else f"{title}\n({n - bars.n:,} of them never free, or lost: left out)"
 
 

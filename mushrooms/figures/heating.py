@@ -97,17 +97,9 @@ def fastest(narrowest: float, shallowest: float, *, clockwise: bool = False) -> 
         loop = decode(x)
         return -loop.m1 / loop.path
 
-    best = min(
-        (
-            minimize(loss, start, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-11})
-            for start in STARTS
-        ),
-        key=lambda found: found.fun,
-    )
+    start = (0.0, -1.0)  # log of the stroke of h, and where between its bounds log w0 lies
+    best = minimize(loss, start, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-11})
     return decode(best.x), -float(best.fun)
-
-
-STARTS = ((0.0, -1.0), (2.0, 1.0))  # log of the stroke of h, and where between its bounds log w0 lies
 
 
 def moving_cap(phase: float, radius: float, depth: float) -> Mushroom:

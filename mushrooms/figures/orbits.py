@@ -21,10 +21,10 @@ import theory
 from mushrooms import lyapunov
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as tables
-from mushrooms.orbits import BoolArray, FloatArray, FollowedOrbit, boundary, boundary_map, span_of_nu
+from mushrooms.orbits import BoolArray, FollowedOrbit, boundary, boundary_map, span_of_nu
 from scene import Mushroom, Scene, Stem
 from scene.geometry import table_at
-from scene.laws import is_constant
+from scene.laws import FloatArray, is_constant
 from scene.mouth import start_time
 from scene.refusal import BadInput, shown
 

@@ -13,13 +13,10 @@ from itertools import islice
 from typing import Any, BinaryIO
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib import colormaps, rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-
-FloatArray = npt.NDArray[np.float64]
 
 BLUE, SKY, ORANGE, BLACK, GREY, GREEN = "#0072B2", "#A6CEE9", "#D55E00", "#1A1A1A", "#8C8C8C", "#009E73"
 LONGEST, MOST_LINES = 40, 3  # letters of a line, and lines, of a name in a title

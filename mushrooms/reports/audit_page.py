@@ -58,18 +58,6 @@ Data = dict[str, Any]  # as JSON has it
 PIXELS_PER_INCH = 104  # of a screen: a figure is shown no larger
 
 
-def machine() -> dict[str, str | int]:
-    """Return what the numbers were computed on."""
-    return {
-        "platform": platform.platform(),
-        "processor": platform.machine(),
-        "cores": os.cpu_count() or 0,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "numba": numba.__version__,
-    }
-
-
 def to_data(result: AuditResult) -> Data:
     """Return the content of report.json."""
     pairs = zip(result.claims, result.findings, strict=True)
@@ -81,7 +69,14 @@ def to_data(result: AuditResult) -> Data:
         "wall_time_s": round(result.seconds, 3),
         "resumed": result.settings.resume,
         "kernel_time_s": round(sum(sample.seconds for sample in result.samples.values()), 3),
-        "machine": machine(),
+        "machine": {
+            "platform": platform.platform(),
+            "processor": platform.machine(),
+            "cores": os.cpu_count() or 0,
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "numba": numba.__version__,
+        },
         "false_alarms": {
             "allowed": FAMILY_LEVEL,
             "bound": result.n_tests * LEVEL,

@@ -16,7 +16,7 @@ from mushrooms.reports.page import embed, render
 from scene import BadInput
 
 ALL = "all"  # workloads, in one table
-BESIDE = "moving-cap-1e7"  # what its times are compared with
+HEADLINE = "moving-cap-1e7"  # a first look; its times are what the others are compared with
 
 
 def to_html(record: Record, speed: bytes) -> str:
@@ -79,12 +79,12 @@ def to_markdown(record: Record, workload: str) -> str:
 def _by_workload(record: Record) -> str:
     """Return what a collision takes in the lanes on each workload that they serve, beside the lean C."""
     ns = {(p.workload, p.solver): statistics.median(p.ns) for p in record.points}
-    head = ("workload", "lanes, ns per collision", f"beside {BESIDE}", "lean C over lanes")
+    head = ("workload", "lanes, ns per collision", f"beside {HEADLINE}", "lean C over lanes")
     rows = []
     for name in (w.name for w in record.workloads):
         lanes, lean = (ns.get((name, solver)) for solver in ("fast, lanes", "lean C"))
         if lanes is not None:
-            usual = ns.get((BESIDE, "fast, lanes"))
+            usual = ns.get((HEADLINE, "fast, lanes"))
             parts = [None if usual is None else lanes / usual, None if lean is None else lean / lanes]
             rows.append((name, f"{lanes:,.0f}", *("–" if x is None else f"{x:.2g}" for x in parts)))
     return _as_table(head, rows)
@@ -125,11 +125,9 @@ MARKS = {
     "time-stepping": "v",
     "fixed-step": "^",
     "lean": "P",
-    "example": "h",
     "command": "*",
 }
-# In one panel for a first look: a workload, and what its steppers are called.
-HEADLINE = "moving-cap-1e7"
+# What the steppers are called in one panel for a first look.
 NAMED = {
     "fast, lanes": "fast, many particles",
     "fast, a call": "fast, a call from Python",
@@ -163,14 +161,22 @@ def headline(record: Record) -> Figure:
         if p.workload == workload.name and (p.solver in NAMED or p.family in ("proof", "command"))
     ]
     figure, axes = plots.new_figure(8.0, 5.0)
-    axes.set(xscale="log", yscale="log", xlim=(0.65, record.digits), ylim=(LEAST_NS, 1e8))
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlim=(0.65, record.digits),
+        ylim=(LEAST_NS, 1e8),
+        xlabel="correct digits of an answer (mark: median; bar: to the worst)",
+        ylabel="ns per collision",
+        title=f"One core, {workload.name}: {workload.what}",
+    )
     axes.set_xticks(TICKS, map(str, TICKS))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.tick_params(labelsize=LABEL)
     axes.axvline(BINARY64, color=plots.BLACK, linewidth=0.8, linestyle=":")
     for p in points:
         _mark(axes, p)
-        share = _share_wrong(p)
+        share = p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
         name = NAMED.get(p.solver, "" if p.family == "proof" else short_name(p.solver)) + (
             f",\n{100 * share:.1g} % wrong walls" if share else ""
         )
@@ -178,11 +184,6 @@ def headline(record: Record) -> Figure:
         place, style["ha"] = PLACES.get(p.family, ((9, 0), "left"))
         axes.annotate(name, (_digits_of(p)[0], statistics.median(p.ns)), place, fontsize=LABEL + 1, **style)
     axes.text(BINARY64 * 1.04, 4e7, "binary64", fontsize=LABEL)
-    axes.set(
-        xlabel="correct digits of an answer (mark: median; bar: to the worst)",
-        ylabel="ns per collision",
-        title=f"One core, {workload.name}: {workload.what}",
-    )
     return figure
 
 
@@ -195,10 +196,6 @@ def _mark(axes: Any, p: Point) -> None:
         axes.plot(middle, ns, marker=MARKS[p.family], markersize=5.5, color=colour, linestyle="none")
 
 
-def _share_wrong(p: Point) -> float:
-    return p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
-
-
 def _digits_of(p: Point) -> tuple[float, float]:
     """Return the correct digits of the median and of the worst right answer."""
     if not p.relative:
@@ -207,10 +204,9 @@ def _digits_of(p: Point) -> tuple[float, float]:
 
 
 def short_name(solver: str) -> str:
-    """Return a solver's label."""
-    for part in ("proof, ", " digits", "fast, ", "solve_ivp, ", "example in ", "command ", "steps, flight"):
-        solver = solver.replace(part, "1" if part == "steps, flight" else "")
-    return plots.plain(solver if len(solver) < 18 else solver[:17] + "…")
+    """Return the label of a command that is measured too."""
+    command = solver.removeprefix("command ")
+    return plots.plain(command if len(command) < 18 else command[:17] + "…")
 
 
 @rc_context(plots.STYLE)

@@ -18,7 +18,6 @@ from conformance import vectors
 from conformance.grading.agreement import FAIR, SHARP, middle
 from conformance.suite import Result, Run, reports
 from conformance.suite.session import outcomes_of
-from conformance.vectors import Vector
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as draw
 from mushrooms.reports.page import embed, render
@@ -61,7 +60,7 @@ def _worst(run: Run) -> list[Result]:
     return sorted(passed, key=lambda r: math.inf if r.ulps is None else r.ulps, reverse=True)[:N_SHARPEST]
 
 
-def _case(result: Result, vector: Vector) -> dict[str, Any]:
+def _case(result: Result, vector: vectors.Vector) -> dict[str, Any]:
     try:
         figure = embed(paths(result, vector))
     except BadInput:  # a vector whose scene must be refused has no table to draw
@@ -137,7 +136,7 @@ STROKES = ((plots.ORANGE, 4.0, "certified"), (plots.BLUE, 1.5, "given"))
 Steps = list[dict[str, Any]]  # the state after each
 
 
-def paths(result: Result, vector: Vector) -> bytes:
+def paths(result: Result, vector: vectors.Vector) -> bytes:
     """Draw a case as SVG: the table at the start and at the hit, both paths, and the hit close up.
 
     Raises:

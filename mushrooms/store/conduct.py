@@ -23,7 +23,6 @@ import numpy as np
 
 import fast
 import mushrooms
-from fast import Paused
 from mushrooms.store.run import BlockRange, StoredRun, attributes_of, is_run
 from mushrooms.store.spec import RunSpec, columns, difference, made_by, shape_of
 from mushrooms.store.summary import expected_collisions
@@ -31,7 +30,7 @@ from scene import BadInput
 
 # Receives the number of finished particles of the block in progress; its exceptions end the engine.
 OnProgress = Callable[[int], None]
-Following = Generator[tuple[BlockRange, Paused], None, None]
+Following = Generator[tuple[BlockRange, fast.Paused], None, None]
 Engine = Callable[[RunSpec, Iterator[BlockRange], OnProgress], Following]
 RETRIES = 10  # of a block whose workers fail or die
 BLOCKS_AHEAD = 2  # waiting for each thread of the cluster: no worker idles, and few blocks are in memory
@@ -41,7 +40,7 @@ POLL_INTERVAL = 0.5  # seconds after which limits are looked at while no block c
 
 def follow(
     spec: RunSpec, block_range: BlockRange, threads: int | None, on_progress: OnProgress | None = None
-) -> Paused:
+) -> fast.Paused:
     """Follow the particles of a block, from their starts or from where they were.
 
     Raises:
@@ -69,7 +68,7 @@ def in_process(
         yield block_range, follow(spec, block_range, threads, on_progress)
 
 
-def follow_elsewhere(version: str, spec: RunSpec, block_range: BlockRange, threads: int) -> Paused:
+def follow_elsewhere(version: str, spec: RunSpec, block_range: BlockRange, threads: int) -> fast.Paused:
     """Follow a block on a worker, which must be of the version that asks.
 
     Raises:
@@ -344,7 +343,7 @@ def _probe(run: StoredRun) -> None:
         _compare(run, longer, follow(spec, block_range, None))
 
 
-def _compare(run: StoredRun, one: Paused, other: Paused) -> None:
+def _compare(run: StoredRun, one: fast.Paused, other: fast.Paused) -> None:
     ones, others = columns(one), columns(other)
     for name in run.shape.names:
         if not np.array_equal(ones[name], others[name], equal_nan=ones[name].dtype.kind == "f"):

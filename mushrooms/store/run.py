@@ -249,16 +249,13 @@ class StoredRun:
                 f"run {str(self.folder)!r} has {there} of {n} particles: go on with {self.command}"
             )
 
-    def part(self, number: int, name: str) -> Array | None:
-        """Return a field of `fast.Ensemble` for the particles of a block; None where it holds nothing."""
+    def part(self, number: int, name: str) -> Array:
+        """Return a field of `fast.Ensemble` for the particles of a block; its bytes are the same."""
         if name == "energy":
             return self.read(number, "cycle_energies")[:, -1]
         if name == "n_collisions":
             return np.asarray(self.read(number, "wall_counts").sum(axis=1))
-        if name not in self.shape.names:
-            return None
-        array = self.read(number, name)
-        return array.astype(bool) if name == "phase_captured" else array
+        return self.read(number, name) if name in self.shape.names else np.empty(0)
 
     def sha256(self) -> str:
         """Return `fast.Ensemble.sha256` of all particles, block by block: memory does not grow with the run.
@@ -271,9 +268,7 @@ class StoredRun:
         digest = hashlib.sha256()
         for name in DIGESTED:
             for number in range(self.shape.n_blocks):
-                array = self.part(number, name)
-                if array is not None:
-                    digest.update(np.ascontiguousarray(array).data)
+                digest.update(np.ascontiguousarray(self.part(number, name)).data)
         return digest.hexdigest()
 
     def gains(self) -> Iterator[Array]:
@@ -299,7 +294,8 @@ class StoredRun:
     def _count(self, marker: Marker, tally: RunTally) -> None:
         self._markers[marker.number] = marker
         if self._is_finished(marker.number):
-            self.tally, self.seconds = self.tally.merged(tally), self.seconds + marker.seconds
+            self.tally = RunTally(*(a + b for a, b in zip(self.tally, tally, strict=True)))
+            self.seconds += marker.seconds
 
     def _path(self, number: int) -> Path:
         return self.folder / MARKERS / f"{number}.marker"
@@ -377,13 +373,12 @@ def open_run(folder: Path) -> StoredRun:
     return run
 
 
-TIMES = ("seconds", "threads")
-
-
 def write_npz(run: StoredRun, file: BinaryIO) -> None:
     """Write the fields of `fast.Ensemble` (times left out) as numpy reads them."""
     fields = run.ensemble(run.shape.n_particles)._asdict()
-    held = {name: array for name, array in fields.items() if np.size(array) and name not in TIMES}
+    held = {
+        name: array for name, array in fields.items() if np.size(array) and name not in ("seconds", "threads")
+    }
     np.savez(file, **held)
 
 

@@ -12,8 +12,9 @@ from mpmath import fp
 
 import theory
 from fast.ensemble import FOLLOWED, UNDECIDED, Ensemble, one_cycle
+from mushrooms.orbits import stretches
 from mushrooms.store.spec import RunSpec
-from scene import BadInput, Cap, Mushroom, Scene, Stem
+from scene import BadInput, Mushroom, Scene
 from scene.geometry import table_at
 from scene.mouth import mouth_minima, start_time
 
@@ -35,10 +36,6 @@ class RunTally(NamedTuple):
     careful: int = 0
     met: int = 0
     captured: int = 0
-
-    def merged(self, other: RunTally) -> RunTally:
-        """Return the tally of both."""
-        return RunTally(*(a + b for a, b in zip(self, other, strict=True)))
 
 
 def tally_of(found: Ensemble) -> RunTally:
@@ -116,16 +113,13 @@ def _as_first_cycles(scene: Scene, n_cycles: int) -> float:
     if n_cycles <= 1 or not isinstance(scene, Mushroom):
         return n_cycles
     growth = float(theory.mean_of(scene, lambda s: s.context.exp(s / 2), 5))
-    n = min(n_cycles, MOST_CYCLES)
-    return max(float(n_cycles), math.fsum(growth**k for k in range(n)))
+    return max(float(n_cycles), math.fsum(growth**k for k in range(min(n_cycles, MOST_CYCLES))))
 
 
 def _size(scene: Scene, t: float) -> tuple[float, float]:
     """Return a table's area [length^2] and the length of its walls [length] at a time."""
-    now: Any = table_at(fp, scene, t)
-    top = 2 * now.w if isinstance(scene, Stem) else math.pi * now.r + 2 * (now.r - now.w)
-    stem = 2 * (now.h * math.hypot(1.0, now.slope) + now.half_width(-now.h))
-    return float(now.cap_area() + now.stem_area()), float(top + (0 if isinstance(scene, Cap) else stem))
+    now = table_at(fp, scene, t)
+    return float(now.cap_area() + now.stem_area()), math.fsum(part.length for part in stretches(now))
 
 
 def careful_note(summary: Mapping[str, Any]) -> str | None:
@@ -178,8 +172,7 @@ def measured(spec: RunSpec, n_captured: int, gain: Gain) -> dict[str, Any]:
     """
     n, k = gain.n, spec.n_cycles
     mean, error = (None if x is None else x / k for x in (gain.mean, gain.standard_error))
-    has_island = isinstance(spec.scene, Mushroom)
-    free = 1.0 - n_captured / (n * k) if n and has_island else None
+    free = 1.0 - n_captured / (n * k) if n and isinstance(spec.scene, Mushroom) else None
     free_error = None if free is None else _measured_error(spec.scene, free, n * k)
     found = predicted(spec)
     m1_z = p_nc_z = None

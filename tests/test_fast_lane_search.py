@@ -248,6 +248,7 @@ def test_uncompiled_lanes_give_the_bits_of_compiled_ones(group):
     "name",
     deep_among(
         MUTANTS,
+        "concavity of the arc under a chord",
         "how long the polynomials hold",
         "how long the radius was known before",
         "the slope of the side that is met",
@@ -285,8 +286,8 @@ def count_wrong_walls(draw, kernels, n_scenes, tally):
 @pytest.mark.parametrize("draw", CORNERS)
 def test_a_hit_near_a_corner_is_on_the_right_side_of_it(draw, tally):
     """Where Newton's step leads, and not only where it begins."""
-    assert count_wrong_walls(draw, lanes, 20, tally) == 0
-    assert tally["answered"] > 300 or "resting" in draw  # there lanes refuse nearly all
+    assert count_wrong_walls(draw, lanes, 8, tally) == 0
+    assert tally["answered"] > 100 or "resting" in draw  # there lanes refuse nearly all
 
 
 NO_SLACK = ("return slack if error < s else 0.0", "return 0.0")

@@ -132,20 +132,16 @@ def test_who_cannot_go_on_is_followed_from_the_start(monkeypatch):
 def test_no_number_of_a_lane_may_be_forgotten(monkeypatch):
     """Each is needed in some run. A last state, which has six of them, is thus not enough to go on from."""
     monkeypatch.setattr(ensemble.records, "ANEW", 99)  # nobody is followed anew
-    missed, n_runs = set(range(follow.LANE_ROWS)), 0
-    for scene in SCENES.values():
-        for energy in (3.0, 300.0):
-            asked = {"n_particles": 100, "energy": energy, "seed": 8, "phases": (0.3, 0.8)}
-            one, three = (fast.go_on(scene, n_cycles=n, **asked) for n in (1, 3))
-            if not is_same(fast.go_on(scene, n_cycles=3, before=one, **asked), three):
-                continue
-            n_runs += 1
-            for column, factor in product(sorted(missed), (0.0, 1.0 + 2.0**-40)):
-                spoilt = one._replace(lanes=one.lanes.copy())
-                spoilt.lanes[:, column] = factor * one.lanes[:, column] if factor else 0.0
-                if not is_same(fast.go_on(scene, n_cycles=3, before=spoilt, **asked), three):
-                    missed.discard(column)
-    assert n_runs > len(SCENES)
+    missed = set(range(follow.LANE_ROWS))
+    for name in ("many harmonics", "fixed cap", "a cap alone"):
+        scene, asked = SCENES[name], {"n_particles": 100, "energy": 3.0, "seed": 8, "phases": (0.3, 0.8)}
+        one, three = (fast.go_on(scene, n_cycles=n, **asked) for n in (1, 3))
+        assert is_same(fast.go_on(scene, n_cycles=3, before=one, **asked), three)
+        for column, factor in product(sorted(missed), (0.0, 1.0 + 2.0**-40)):
+            spoilt = one._replace(lanes=one.lanes.copy())
+            spoilt.lanes[:, column] = factor * one.lanes[:, column] if factor else 0.0
+            if not is_same(fast.go_on(scene, n_cycles=3, before=spoilt, **asked), three):
+                missed.discard(column)
     assert missed == set()
 
 

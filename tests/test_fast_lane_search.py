@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from support.depth import deep_among
 from support.faulty_kernels import faulty_lanes
-from support.lane_anywhere import draw_anywhere
 from support.lane_corners import CORNERS
 from support.lane_search import GROUPS, Round, search
 
@@ -18,7 +17,7 @@ import reference
 from fast.batch import LaneRound, lane_steps
 from fast.kernel import lanes, records
 from fast.step import WALL_NAMES
-from scene import Cap, Collision, Mushroom, Rejected, State
+from scene import Cap, Collision, Mushroom, State
 
 N_ANSWERS = int(os.environ.get("MUSHROOMS_LANE_ANSWERS", "150"))  # of each group of draws
 
@@ -40,24 +39,6 @@ def test_a_spoilt_lane_is_seen(column, monkeypatch, tally):
 
     monkeypatch.setattr(Round, "step", spoilt)
     assert search(1, 100, tally, "arc to base") != []
-
-
-def test_lanes_alone_take_the_careful_steps_and_no_free_starts(tally):
-    random = np.random.default_rng(8)
-    for _ in range(12):
-        scene, starts = draw_anywhere(24, random)
-        rows = [(tuple(float(v) for v in np.delete(p, 1)), wall) for p, wall in starts]
-        on_walls = [State(*row, WALL_NAMES[wall]) for row, wall in rows]
-        free = [State(*row) for row, _ in rows]
-        assert set(lane_steps(scene, free)) == {None}
-        for state, found in zip(on_walls, lane_steps(scene, on_walls), strict=True):
-            truth = fast.next_collision(scene, state, state.t + 1e3)
-            if found is None or isinstance(truth, Rejected):
-                continue
-            tally["lane steps"] += 1
-            assert isinstance(truth, Collision)
-            assert (found.wall, found.dt) == (truth.wall, pytest.approx(truth.dt, rel=1e-6))
-    assert tally["lane steps"] > 20
 
 
 def test_lanes_that_took_free_starts_would_be_wrong(monkeypatch, tally):

@@ -314,11 +314,6 @@ def test_a_spoilt_jacobian_does_not(row, scale):
     assert not is_kept(rows, FROM_THE_CAP, end, Fraction(1, 10**25))
 
 
-def test_trajectory_keeps_the_symplectic_form():
-    jacobian, end = differentiated(load("moving-cap"), FROM_THE_CAP, 12)
-    assert is_kept(jacobian, FROM_THE_CAP, end, Fraction(1, 10**20))
-
-
 @pytest.mark.parametrize(
     ("start", "walls"),
     [(FROM_THE_CAP, ["arc", "floor", "arc", "arc", "base"]), (State(0.3, 0.1, -0.2, 10.0, -27.0), ["floor"])],

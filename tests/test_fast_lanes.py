@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from mpmath import MPContext
 from msgspec.structs import replace
 from numba import njit, types
-from support.depth import deep_but
+from support.depth import deep_among, deep_but
 from support.from_python import from_python
 from support.lane_search import Round, try_starts
 
@@ -149,7 +149,10 @@ def test_one_particle_takes_the_steps_of_the_lanes(name, tally):
     assert n_steps > 20 * n_careful
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name",
+    deep_among(SCENES, "ergodic", "fermi-ulam", "fixed-cap-anticlockwise", "a deep mouth", "a deep cap"),
+)
 def test_lanes_take_the_careful_steps(name, tally):
     """From collisions of paths on: the search of test_fast_lane_search.py, in scenes that people ask for."""
     scene, random = SCENES[name], np.random.default_rng(3)

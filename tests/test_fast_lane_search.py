@@ -245,7 +245,7 @@ def test_the_search_kills(name, tally):
 
 
 def count_wrong_walls(draw, kernels, tally):
-    """Count the lane answers near a corner, in a few scenes, that name another wall than is proved to be first."""
+    """Count the lane answers near corners that name another wall than the one that is proved to be first."""
     random = np.random.default_rng(5)
     for _ in range(8):
         scene, starts = CORNERS[draw](records.LANES, random)

@@ -88,16 +88,14 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
     "damage",
     deep_but(
         DAMAGES,
-        *(
-            "emptied",
-            "cut",
-            "a bit at 0.5",
-            "noise",
-            "another object",
-            "a folder",
-            "not to be read",
-            "missing",
-        ),
+        "emptied",
+        "cut",
+        "a bit at 0.5",
+        "noise",
+        "another object",
+        "a folder",
+        "not to be read",
+        "missing",
     ),
 )
 def test_what_is_damaged_is_compiled_again_and_kept(entry, damage, ending):

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from numba import config
 from numba.core.caching import IndexDataCacheFile
+from support.depth import deep_but
 from support.entries import kept_entries
 
 import fast
@@ -83,7 +84,20 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("ending", ["nbi", "nbc"], ids=["index", "code"])
-@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize(
+    "damage",
+    deep_but(
+        DAMAGES,
+        "emptied",
+        "cut",
+        "a bit at 0.5",
+        "noise",
+        "another object",
+        "a folder",
+        "not to be read",
+        "missing",
+    ),
+)
 def test_what_is_damaged_is_compiled_again_and_kept(entry, damage, ending):
     assert [entry.is_hit(), entry.is_hit()] == [False, True]
     DAMAGES[damage](entry.file(ending))

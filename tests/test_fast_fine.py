@@ -25,7 +25,7 @@ from scene import BangBang, Cap, Collision, Mushroom, State, Stem, Undecided, lo
 from scene.geometry import table_at
 from scene.tables import period
 
-N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "250"))
+N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "100"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
 SHARP = 4.0  # units that nearly all answers keep
 WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.kernel.fine_step

@@ -1,6 +1,5 @@
 """Ensembles that go on: the bits of all cycles at once, wherever they are cut, and who may not go on."""
 
-import os
 from itertools import product
 
 import numpy as np
@@ -8,9 +7,6 @@ import pytest
 from msgspec.structs import replace
 
 import fast
-from conformance.cases.draw import Draw
-from conformance.cases.scenes import MOVING, TABLES, clock
-from conformance.cases.scenes import scene as drawn_scene
 from fast import ensemble, pieces
 from fast.ensemble import one_cycle
 from fast.kernel import follow
@@ -18,7 +14,6 @@ from fast.kernel.arithmetic import MAX_QUADRANT
 from fast.units import fit
 from scene import BadInput, BangBang, Cap, Fourier, Mushroom, load
 
-N_DRAWN = int(os.environ.get("MUSHROOMS_GOES", "3"))
 TWICE = tuple(zip(map(float, range(9)), (1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0), strict=True))
 BREATH = ((0.0, 1.0), (2.0, 1.0), (2.5, 1.25), (6.0, 1.25), (6.5, 1.0), (8.0, 1.0))
 WAVE = Fourier(mean=1.0, omega=1.0, sin=(0.3,))
@@ -67,28 +62,13 @@ def is_same(found, wanted):
 @pytest.mark.parametrize("name", SCENES)
 def test_cycles_in_goes_are_those_at_once(name):
     scene, random = SCENES[name], np.random.default_rng(len(name))
-    for energy in (1.0, 40.0, 1500.0):
+    for energy in (0.01, 1.0, 40.0, 1500.0):  # at 0.01 a flight lasts for several stops, and pieces of laws
         cuts, phases = cuts_of(random), sorted(random.uniform(0.01, 0.99, 2).tolist())
         asked = {"n_particles": 80, "energy": energy, "seed": int(energy), "phases": phases}
         found = in_goes(scene, cuts, threads=1, **asked)
         assert is_same(found, fast.go_on(scene, n_cycles=cuts[-1], threads=2, **asked))
         assert found.ensemble.sha256() == fast.simulate(scene, n_cycles=cuts[-1], **asked).sha256()
         assert found.ensemble.ns_per_collision() > 0.0
-
-
-def test_slow_particles_of_drawn_scenes_go_on_alike(tally):
-    """A flight lasts for several stops, and for several pieces of the laws; many steps are scalar ones."""
-    random = np.random.default_rng(11)
-    while tally["runs"] < N_DRAWN:
-        draw = Draw(f"goes/{tally['runs']}")
-        scene = drawn_scene(draw, draw.pick(TABLES), clock(draw, MOVING))
-        phases = sorted(random.uniform(0.01, 0.99, int(random.integers(0, 8))).tolist())
-        energy = float(10.0 ** random.uniform(-1, 2)) / one_cycle(scene) ** 2
-        cuts, asked = cuts_of(random, 5), {"n_particles": 30, "energy": energy, "phases": phases}
-        whole = fast.go_on(scene, n_cycles=cuts[-1], **asked)
-        assert is_same(in_goes(scene, cuts, **asked), whole), (scene, cuts, asked)
-        assert np.isfinite(whole.ensemble.cycle_energies[whole.ensemble.outcome == 0]).all()
-        tally["runs"] += 1
 
 
 def test_the_last_energy_is_known_however_the_horizon_is_rounded():
@@ -132,20 +112,16 @@ def test_who_cannot_go_on_is_followed_from_the_start(monkeypatch):
 def test_no_number_of_a_lane_may_be_forgotten(monkeypatch):
     """Each is needed in some run. A last state, which has six of them, is thus not enough to go on from."""
     monkeypatch.setattr(ensemble.records, "ANEW", 99)  # nobody is followed anew
-    missed, n_runs = set(range(follow.LANE_ROWS)), 0
-    for scene in SCENES.values():
-        for energy in (3.0, 300.0):
-            asked = {"n_particles": 100, "energy": energy, "seed": 8, "phases": (0.3, 0.8)}
-            one, three = (fast.go_on(scene, n_cycles=n, **asked) for n in (1, 3))
-            if not is_same(fast.go_on(scene, n_cycles=3, before=one, **asked), three):
-                continue
-            n_runs += 1
-            for column, factor in product(sorted(missed), (0.0, 1.0 + 2.0**-40)):
-                spoilt = one._replace(lanes=one.lanes.copy())
-                spoilt.lanes[:, column] = factor * one.lanes[:, column] if factor else 0.0
-                if not is_same(fast.go_on(scene, n_cycles=3, before=spoilt, **asked), three):
-                    missed.discard(column)
-    assert n_runs > len(SCENES)
+    missed = set(range(follow.LANE_ROWS))
+    for name in ("many harmonics", "fixed cap", "a cap alone"):
+        scene, asked = SCENES[name], {"n_particles": 100, "energy": 3.0, "seed": 8, "phases": (0.3, 0.8)}
+        one, three = (fast.go_on(scene, n_cycles=n, **asked) for n in (1, 3))
+        assert is_same(fast.go_on(scene, n_cycles=3, before=one, **asked), three)
+        for column, factor in product(sorted(missed), (0.0, 1.0 + 2.0**-40)):
+            spoilt = one._replace(lanes=one.lanes.copy())
+            spoilt.lanes[:, column] = factor * one.lanes[:, column] if factor else 0.0
+            if not is_same(fast.go_on(scene, n_cycles=3, before=spoilt, **asked), three):
+                missed.discard(column)
     assert missed == set()
 
 

@@ -8,7 +8,6 @@ given, and a flight that comes from the base does not.
 
 import math
 import os
-import random
 
 import numpy as np
 import pytest
@@ -97,23 +96,6 @@ def wrong_answers(questions):
 
 def test_recollisions_are_right_to_four_backward_ulps():
     assert wrong_answers(again(N_RECOLLISIONS)) == []
-
-
-def off_the_arc(draw):
-    """Return a start on the arc, off it by as much as is allowed, almost along it."""
-    mean, t = draw.choice((0.75, 1.0, 1.3)), draw.choice((0.0, draw.uniform(-3, 3)))
-    legs = BangBang(((0.0, mean), (1.0, 1.2 * mean), (2.0, mean)))
-    scene = Cap(r=draw.choice((mean, Fourier(mean, 1.0, (0.1 * mean,)), legs)))
-    r = scene.at(t)["r"] * (1 + draw.choice((-1, 1)) * 2.0 ** -draw.uniform(20.2, 53))
-    angle, v = draw.uniform(0.05, 3.0), 10 ** draw.uniform(-1, 3)
-    ahead = angle + draw.choice((-1, 1)) * (math.pi / 2 + 10 ** -draw.uniform(0.5, 10))
-    place, velocity = ((size * math.cos(a), size * math.sin(a)) for size, a in ((r, angle), (v, ahead)))
-    return scene, State(t, *place, *velocity, "arc")
-
-
-def test_recollisions_from_off_the_arc_are_right_to_four_backward_ulps():
-    draw = random.Random(1)
-    assert wrong_answers(off_the_arc(draw) for _ in range(8 * N_RECOLLISIONS)) == []
 
 
 @pytest.mark.parametrize("name", UNDEFINED)

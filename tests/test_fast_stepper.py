@@ -13,6 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 import msgspec
 import numpy as np
 import pytest
+from support.depth import deep_but
 from support.from_python import from_python
 from support.tables import CIRCLE, STATIC
 from support.truth import proved_step
@@ -380,7 +381,7 @@ def test_threads_may_ask_side_by_side():
             assert found == expected
 
 
-N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "50"))
+N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "30"))
 
 
 def attack(name, n_cases, seed):
@@ -425,8 +426,8 @@ def test_what_samples_do_not_show_to_be_positive_is_told_to_be_0():
     assert flow.n_careful.sum() >= flow.wall_counts.sum() > 10
 
 
-@pytest.mark.parametrize("n", [1, 2, 4])
-@pytest.mark.parametrize("left", [1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("n", deep_but([1, 2, 4], 4))
+@pytest.mark.parametrize("left", deep_but([1e-4, 1e-6, 1e-8], 1e-8))
 def test_lanes_meet_what_is_left(n, left, tally):
     """As the careful step does: within the four backward ulps of every answer."""
     random, scene = np.random.default_rng(n), Stem(w=1.0, h=sunk(n, left))

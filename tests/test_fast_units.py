@@ -12,10 +12,8 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from support.truth import proved_step
 
 import fast
-from conformance.grading.agreement import compare
 from conformance.strategies import scenes_and_states
 from fast import step as stepper
 from fast.kernel.single import pack_scene
@@ -132,26 +130,6 @@ def test_what_does_not_fit_is_refused(scene, state, words):
     assert "\n" not in found.reason
 
 
-MIXED = Mushroom(
-    r=Fourier(1.5, cos=(0.3,), period=1.0),
-    h=BangBang(((0.0, 2.0), (0.3, 1.0), (0.5, 1.0), (1.0, 2.0))),
-    nu=Fourier(0.5, sin=(0.2, 0.1), period=1.0),
-)
-
-
-def test_fourier_laws_given_by_their_period_share_a_scene_with_knots(tally):
-    """2 pi / period as a sum of two floats: exact phases after two thousand periods."""
-    random = np.random.default_rng(3)
-    for _ in range(12):
-        x, y, vx, vy = (float(v) for v in random.uniform((-0.8, 0.01, -5, -5), (0.8, 0.8, 5, 5)))
-        state = State(float(random.uniform(0, 2000)), x, y, vx, vy)
-        truth = proved_step(MIXED, state, state.t + 10.0)
-        found = compare(fast.next_collision(MIXED, state, state.t + 10.0), truth, state, 4.0)
-        tally[found.verdict] += 1
-        assert found.verdict in ("pass", "declined")
-    assert tally["pass"] > 8
-
-
 @pytest.mark.parametrize("exponent", [-1, -1001])
 def test_what_is_rounded_up_to_the_least_normal_number_is_refused(exponent):
     """It looks like one that has kept its bits."""
@@ -202,7 +180,3 @@ def test_a_stay_that_no_float_holds_is_one_particle_s():
     assert 0 < len(lost) < len(states)
     assert all("beyond binary64" in together.outcomes[i].reason for i in lost)
     assert np.isnan(together.t_in[lost]).all()
-    for i, state in enumerate(states):
-        alone = fast.flow(scene, [state], period)
-        assert alone.outcomes == [together.outcomes[i]]
-        assert np.array_equal(alone.t_in, together.t_in[i : i + 1], equal_nan=True)

@@ -145,16 +145,15 @@ def law_of_reflection():
 
 def slow_across_periods():
     """Particles that come to a wall within thousands of periods, whose waves never are all at their least."""
-    draw = random.Random(3)
-    for _ in range(2):
-        law = Fourier(mean=1.0, period=1.0, sin=(0.1, 0.02, draw.uniform(-0.02, 0.02)), cos=(0.05,))
-        v, t = 10.0 ** -draw.uniform(2.5, 5.5), draw.random()
-        for wall, scene, q in (
-            ("floor", Stem(w=1.0, h=law), State(t, 0.25, -0.5, 0.125 * v, -v)),
-            ("right", Stem(w=law, h=1.0), State(t, 0.5, -0.5, v, 0.0)),
-            ("arc", Cap(r=law), State(t, 0.0, 0.5, 0.0, v)),
-        ):
-            assert proved_wall(scene, q, 1e9) == wall
+    draw = random.Random(1)
+    law = Fourier(mean=1.0, period=1.0, sin=(0.1, 0.02, draw.uniform(-0.02, 0.02)), cos=(0.05,))
+    v, t = 10.0 ** -draw.uniform(2.5, 5.5), draw.random()
+    for wall, scene, q in (
+        ("floor", Stem(w=1.0, h=law), State(t, 0.25, -0.5, 0.125 * v, -v)),
+        ("right", Stem(w=law, h=1.0), State(t, 0.5, -0.5, v, 0.0)),
+        ("arc", Cap(r=law), State(t, 0.0, 0.5, 0.0, v)),
+    ):
+        assert proved_wall(scene, q, 1e9) == wall
 
 
 # A floor whose highest place is well below what its amplitudes add up to.
@@ -200,7 +199,7 @@ def starts_along_a_wall_that_rests():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Isolator, "_split", watched)
-        for _ in range(100):
+        for _ in range(25):
             place, speed = draw.uniform(0.1, 3.0), 10.0 ** draw.uniform(-1.0, 3.0)
             course = place + draw.choice((1.0, -1.0)) * draw.uniform(1.0, 1.5)
             vx, vy = -speed * math.cos(course), -speed * math.sin(course)
@@ -214,7 +213,7 @@ def waves_within_their_enclosures():
     """A law and its derivatives within intervals of all lengths, where waves cancel and elsewhere."""
     draw, arithmetic = random.Random(2), Arithmetic(DIGITS)
     fine = Arithmetic(2 * DIGITS)
-    for i in range(120):
+    for i in range(48):
         law = sunk(1 + i % 6, 10.0 ** -draw.uniform(1.0, 8.0), draw.random())
         start, length = Fraction(draw.uniform(-2.0, 2.0)), Fraction(10.0 ** -draw.uniform(0.3, 15.0))
         whole = law_in_time(arithmetic, law, Fraction(0)).jet(arithmetic.between(start, start + length))
@@ -224,15 +223,15 @@ def waves_within_their_enclosures():
                 assert thin in arithmetic.context.mpf(wide)
 
 
-# The two that take seconds come last: most faults have been found out by then.
+# What takes longest comes last: most faults have been found out by then.
 BATTERY = (
     answers_by_hand,
     starts_where_a_wall_turns,
     law_of_reflection,
     differentiated,
     waves_within_their_enclosures,
-    slow_across_periods,
     starts_along_a_wall_that_rests,
+    slow_across_periods,
     bounded_work,
 )
 
@@ -243,7 +242,7 @@ def test_the_reference_passes(check):
 
 
 def test_every_step_is_proved(tally):
-    n_examples = 10_000 if IS_DEEP else 150
+    n_examples = 10_000 if IS_DEEP else 60
 
     @settings(max_examples=n_examples)
     @given(scenes_and_states())
@@ -260,7 +259,7 @@ def test_every_step_is_proved(tally):
 
 
 def test_every_path_is_proved(tally):
-    n_examples = 5_000 if IS_DEEP else 60
+    n_examples = 5_000 if IS_DEEP else 30
 
     @settings(max_examples=n_examples)
     @given(scenes_and_states(), st.integers(1, 6), st.sampled_from((None, 10, 25)))
@@ -332,9 +331,6 @@ STEPS = {
 }
 
 
-STEPS |= {name: (scene, state, t_end) for name, (scene, state, t_end, _, _) in ANSWERS.items()}
-
-
 STEPS |= {name: answer[:3] for name, answer in ANSWERS.items()}
 
 
@@ -402,7 +398,7 @@ def test_a_leap_within_an_enclosed_time_is_proved(working):
 def test_places_known_to_some_tenths_are_proved(tally):
     """Eight decimals are too few for twelve flights: enclosures end as wide as the table."""
     draw = random.Random(5)
-    for _ in range(100 if IS_DEEP else 20):
+    for _ in range(100 if IS_DEEP else 8):
         start = State(0.0, draw.uniform(-0.9, 0.9), 0.0, draw.uniform(-1, 1), draw.uniform(0.1, 1), "base")
         claim = prove_path(Cap(r=1.0), start, 12, working=8)
         low, high = claim.steps[-1].ends("x")
@@ -607,7 +603,7 @@ MUTANTS = {
 }
 
 
-@pytest.mark.parametrize("name", deep_among(MUTANTS, "half the kick", "no limit to the work"))
+@pytest.mark.parametrize("name", deep_among(MUTANTS, "no limit to the work"))
 def test_a_mutant_is_killed(name, monkeypatch):
     """Killed by an answer that is wrong, or missing, not by a crash."""
     MUTANTS[name](monkeypatch)

@@ -53,15 +53,10 @@ def test_a_fourier_law_is_its_sum():
     assert value(fp, law, t) == pytest.approx(expected, rel=1e-15)
 
 
-@pytest.mark.parametrize(("time", "level"), [(0.0, 1.0), (0.25, 0.3), (0.5, 0.3), (0.75, 1.0), (1.0, 1.0)])
-def test_bang_bang_rests_at_its_knots(time, level):
+def test_bang_bang_rests_at_its_knots_and_is_half_way_and_fastest_at_mid_leg():
     ctx = context(40)
-    assert value(ctx, LEGS, time) == ctx.mpf(level)
-    assert value(ctx, LEGS, time, 1) == 0
-
-
-def test_bang_bang_is_half_way_and_fastest_at_mid_leg():
-    ctx = context(40)
+    for time, level in LEGS.knots:
+        assert (value(ctx, LEGS, time), value(ctx, LEGS, time, 1)) == (ctx.mpf(level), 0)
     low, high = ctx.mpf(0.3), ctx.mpf(1.0)
     assert value(ctx, LEGS, 0.125) == (low + high) / 2
     assert value(ctx, LEGS, 0.125, 1) == 2 * (low - high) / ctx.mpf(0.25)

@@ -41,7 +41,6 @@ from scene import (
 )
 from scene.load import read_data
 from scene.states import check_numbers
-from scene.tables import PARAMETERS
 
 VALID = sorted(set(catalogue()) - {"moving-cap-as-printed"})
 NO_VALUES = [None, *NO_NUMBERS, *NOT_FINITE]
@@ -195,12 +194,6 @@ def test_a_schema_beside_the_parameters_is_ignored(tmp_path):
     (tmp_path / "a.toml").write_text('"$schema" = "x"\ntable = "cap"\nr = 1.0\n', "utf-8")
     assert load(tmp_path / "a.json") == load(tmp_path / "a.toml") == CIRCLE
     assert "$schema" in one_line(from_data, {**data, "r": {"kind": "fourier", "$schema": "x", "mean": 1.0}})
-
-
-def test_parameters_are_those_of_the_tables():
-    given = {field for table in (Cap, Stem, Mushroom) for field in table.__struct_fields__}
-    assert given == {*PARAMETERS, "name", "notes"}
-    assert issubclass(InvalidScene, BadInput)
 
 
 N_FILES = int(os.environ.get("MUSHROOMS_LINES", "300"))  # of each kind

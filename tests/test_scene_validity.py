@@ -389,16 +389,6 @@ def test_corners_lie_on_two_walls_or_on_the_mouth_s_edge(scene):
                 assert near >= 1 + (abs(x) != now.w or isinstance(scene, Stem))
 
 
-@pytest.mark.parametrize("scene", SCENES[1:3])
-def test_points_of_the_stem_are_uniform_in_its_area(scene):
-    """The share of the area above each point is its first number, by the trapezoid's formula."""
-    now = rounded(scene, 0.3)
-    a, b = np.random.default_rng(1).random((2, 100))
-    x, depth = now.uniform_in_stem(a, b)
-    assert depth * (2 * now.w - now.slope * depth) == pytest.approx(a * now.stem_area())
-    assert x / now.half_width(-depth) == pytest.approx(2 * b - 1)
-
-
 N_PHASES = 1 << 13
 ROUNDING = 2.0**-42
 
@@ -471,13 +461,13 @@ def drawn(random, kind):
 def test_random_laws(kind, tally):
     random = np.random.default_rng(11)
     several = 0
-    for _ in range(300):
+    for _ in range(150):
         scene = drawn(random, kind)
         found = mouth_minima(scene)
         assert fault(scene, found) is None, (fault(scene, found), found, scene)
         several += len(found) > 1
         tally[f"{kind}: narrowings"] += len(found)
-    assert several > 50
+    assert several > 25
 
 
 def knots(*pairs):

@@ -15,7 +15,7 @@ import random
 import subprocess
 import sys
 import time
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from functools import partial
 from types import SimpleNamespace
 
@@ -33,7 +33,6 @@ from test_conformance_suite import made_up
 
 import fast
 import fast.__main__ as fast_server
-import reference
 import reference.__main__ as reference_server
 from conformance import plain, vectors
 from conformance.grading.agreement import grade
@@ -43,12 +42,11 @@ from conformance.mutants import COMMON, MUTANTS, PLAIN
 from conformance.suite import checks, reports, session
 from conformance.suite import run as suite
 from conformance.suite.checks import flows, requests, timing
-from conformance.suite.checks.flows import MAX_STATES
-from conformance.suite.checks.form import Draw, octaves, run_check
+from conformance.suite.checks.form import Draw, run_check
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import VERDICTS
 from conformance.suite.session import Limits, Session
-from scene import BadInput, Cap, Horizon, Mushroom, Rejected, State, Stem, from_data
+from scene import Cap, Horizon, Mushroom, Stem
 from scene.load import read_data
 from scene.protocol.messages import Timed
 
@@ -467,29 +465,15 @@ def test_questions_are_a_strategy_too():
     assert isinstance(scene, Mushroom | Cap | Stem)
 
 
-def test_bad_states_are_bad_and_good_ones_good_by_the_reference(tally):
-    """What a check asks must be so: the proving stepper says the same, and leaves nothing open."""
-    for scene, request, why in requests.bad_states(Draw("1"), "step"):
-        start = State(**request["state"])
-        outcome = reference.next_collision(scene, start, request["t_end"])
-        assert isinstance(outcome, Rejected) == bool(why), (scene, request, why, outcome)
+@pytest.mark.parametrize("asks", [requests.bad_states, requests.bad_scenes])
+def test_what_is_asked_as_bad_is_bad_and_the_rest_is_good(asks, tally):
+    """The proving stepper says the same of what a check asks, and leaves nothing open."""
+    for _, request, why in asks(Draw("1"), "step"):
+        answer = json.loads(IN_PROCESS["reference"]([msgspec.json.encode({**request, "seq": 1}) + b"\n"]))
+        assert (answer["outcome"] == "rejected") == bool(why), (request, why, answer)
+        assert answer["outcome"] != "undecided", request
         tally["bad" if why else "good"] += 1
     assert min(tally.values()) > 100
-
-
-def test_bad_scenes_are_bad_and_good_ones_good_by_proof(tally):
-    for data, _, why in requests.bad_scenes(Draw("1"), "step"):
-        with pytest.raises(BadInput) if why else nullcontext():
-            from_data(data)
-        tally["bad" if why else "good"] += 1
-    assert min(tally.values()) > 100
-
-
-def test_no_size_is_a_constant():
-    """Two seeds share no size, and each octave up to the bound is asked about."""
-    one, other = (list(octaves(Draw(str(seed)), 1, MAX_STATES)) for seed in SEEDS[:2])
-    assert not set(one) & set(other)
-    assert [int(size).bit_length() for size in one] == list(range(12, 0, -1))
 
 
 def flow_of(name: str):

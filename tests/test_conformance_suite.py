@@ -151,7 +151,7 @@ MET = {
     "helper-that-talks": ("protocol/stop", "wrong-format", "farewell"),
 }
 SLOW = "ignore-stop", "slow-to-stop", "close-stdout", "huge-line", "endless-line", "daemon"
-SILENT = "late-answer", "ignore-sigterm", "half-a-line"
+SILENT = "late-answer", "ignore-sigterm", "half-a-line", "flood-stderr"
 
 
 def failing(where: str, verdict: str) -> dict[str, str]:

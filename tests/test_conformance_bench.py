@@ -308,9 +308,10 @@ SPOILT_CLOCKS = "one nanosecond", "no time", "milliseconds"
 
 
 @pytest.mark.parametrize("name", deep_among(PROGRAMS, *SPOILT_CLOCKS))
-def test_a_command_is_timed_by_a_clock_that_is_true(drawn, tmp_path, name):
-    """In runs of several ticks of a clock that counts milliseconds."""
+def test_a_command_is_timed_by_a_clock_that_is_true(drawn, tmp_path, monkeypatch, name):
+    """In runs of several ticks of a clock that counts milliseconds; a false clock is tried twice here."""
     text, changes, trouble = PROGRAMS[name]
+    monkeypatch.setattr(timing, "N_TRIES", 2 if trouble else timing.N_TRIES)
     for old, new in changes.items():
         text = text.replace(old, new)
     program = tmp_path / "program.py"
@@ -392,12 +393,6 @@ def test_the_lean_one_is_right_and_time_steps_are_not(library, name):
     assert steps[0].astray > steps[1].astray >= steps[2].astray
     assert all(point.further == 300 and min(point.ns) > 0 for point in steps)
     assert min(min(point.relative, default=1.0) for point in steps) > 1e-6
-
-
-def test_no_checks_cost_walls_where_walls_are_fast_and_corners_near(library):
-    in_c = baselines.in_c(library)
-    assert points(workload_of("slow", 300, 1), in_c)["lean C"].astray > 3
-    assert points(workload_of("near-corner", 100, 1), in_c)["steps, flight/1000"].astray > 10
 
 
 def test_one_path_is_followed_for_its_length(engine):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from mpmath import MPContext
+from support.depth import deep_but
 from support.edges import LATE_EDGES, is_among
 from support.tables import CIRCLE, LIFT, STATIC
 from support.truth import certified_answer, is_delicate, proved_step
@@ -39,14 +40,14 @@ from scene import (
 from scene.laws import value
 from scene.states import ON_WALL
 
-N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "400"))  # MUSHROOMS_STEPS=20000 for the whole
+N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "200"))  # MUSHROOMS_STEPS=20000 for the whole
 BOUND = 4.0  # backward ulps
 # Stepper, how many steps, their bound [backward ulps], and the share that may be undecided: the strategies
 # aim at corners and edges on purpose. Of the plain stepper the corpus asks many more; the worst of 2,500
 # steps was 218, at a slow particle before a fast wall.
 STEPPERS = {
     "fast": (fast.next_collision, N_STEPS, BOUND, 0.04),
-    "plain": (plain.next_collision, 150, 1024.0, 0.08),
+    "plain": (plain.next_collision, 100, 1024.0, 0.08),
 }
 
 
@@ -434,8 +435,9 @@ def test_precision_class(ulps, reached):
     assert precision_class(ulps) == reached
 
 
-def test_exact_answers_pass_within_an_ulp(corpus):
-    grades = [grade(asked, certified_answer(asked)) for asked in corpus]
+@pytest.mark.parametrize("every", deep_but([1, 6], 6))
+def test_exact_answers_pass_within_an_ulp(corpus, every):
+    grades = [grade(asked, certified_answer(asked)) for asked in corpus[::every]]
     assert {found.verdict for found in grades} == {"pass"}
     assert max(found.ulps for found in grades if not math.isnan(found.ulps)) <= 1.0
 
@@ -456,9 +458,10 @@ def shifted(asked: Vector, index: int, name: str, by: float):
     return answer if size else None
 
 
-def test_shifted_answers_fail_and_slightly_shifted_ones_pass(corpus):
+@pytest.mark.parametrize("every", deep_but([3, 12], 12))
+def test_shifted_answers_fail_and_slightly_shifted_ones_pass(corpus, every):
     n_shifted = 0
-    for i, asked in enumerate(corpus[::3]):
+    for i, asked in enumerate(corpus[::every]):
         steps = asked.expect[0].steps
         if not steps or "hard-case-4" in asked.group:
             continue  # extreme numbers: a shift would overflow or vanish
@@ -474,4 +477,4 @@ def test_shifted_answers_fail_and_slightly_shifted_ones_pass(corpus):
         assert found.why.split(" is off")[0].split(": ")[-1] == name
         assert grade(asked, shifted(asked, index, name, bound / 4)).verdict == "pass", asked.id
         n_shifted += 1
-    assert n_shifted > 0.27 * len(corpus)
+    assert n_shifted > 0.8 * len(corpus) / every

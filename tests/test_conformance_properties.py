@@ -59,7 +59,7 @@ from scene.states import check_numbers
 from scene.tables import laws as laws_of
 from scene.tables import period
 
-N_QUESTIONS = 60
+N_QUESTIONS = 40
 HONEST = {"plain": plain.next_collision, "fast": fast.next_collision}
 
 
@@ -116,7 +116,7 @@ def test_the_questions_of_a_broken_property_are_those_that_were_sent(name):
     assert any(sent[line] for line in printed)
 
 
-@pytest.mark.parametrize("question", [GALLERY, STATIC, BREATHING, LIFT])
+@pytest.mark.parametrize("question", deep_but([GALLERY, STATIC, BREATHING, LIFT], GALLERY, STATIC))
 def test_the_reference_holds(question):
     """Few questions, for each takes some dozens of proved steps; the point is that all are compared."""
     compared = [name for name, check in PROPERTIES.items() if check(proved, *question)]
@@ -219,7 +219,7 @@ def test_what_is_clearly_inside_is_refused_by_nobody(tally):
     """Drawn states and nudged ones, inside and out: where an honest stepper refuses, it is never clear."""
     steppers = [reference.next_collision, *HONEST.values()]
 
-    @settings(max_examples=150)
+    @settings(max_examples=100)
     @given(scenes_and_states(), st.sampled_from((0.0, 0.0, 0.5, 2.0**-12, 2.0**-18)))
     def question(drawn, off):
         scene, state, t_end = drawn
@@ -363,7 +363,7 @@ def test_some_waves_add_up_to_more_than_the_mean(tally):
     assert tally["deep"] > 5
 
 
-N_SESSIONS, N_EACH = 30, 30
+N_SESSIONS, N_EACH = 20, 30
 N_DRAWN = N_SESSIONS * N_EACH
 
 
@@ -445,26 +445,6 @@ def test_every_kind_of_scene_and_start_is_reached():
     assert {name: counts[name] for name, least in LEAST.items() if counts[name] < least} == {}
 
 
-def printed(failure, hold, n):
-    """Return the wire's line that is printed when a property fails, and the failure."""
-    trial = settings(max_examples=n, database=None, derandomize=True, deadline=None)(
-        given(scenes_and_states())(hold)
-    )
-    with pytest.raises(failure) as caught:
-        trial()
-    return next(text for text in caught.value.__notes__ if '"cmd"' in text), caught.value
-
-
-def test_a_failing_step_is_printed_as_the_wire_line():
-    def fail(step):
-        raise ZeroDivisionError(repr(step))
-
-    text, failure = printed(ZeroDivisionError, fail, 10)
-    request = json.loads(next(part for part in text.splitlines() if '"cmd"' in part))
-    step = (from_data(request["scene"]), State(**request["state"]), request["t_end"])
-    assert repr(step) == str(failure)
-
-
 @pytest.mark.parametrize("name", deep_but(FAMILIES, "corner-arrival", "anywhere-stem-left", "nearly-shut"))
 def test_every_family_is_reached(name):
     """By Hypothesis's bits as by a seed's."""
@@ -487,22 +467,29 @@ BLIND = {
 def failing_line(name):
     """Return the line that is printed for a stepper that never hits what `name` says."""
 
+    @seed(1)
+    @settings(max_examples=1000, database=None, derandomize=False)
+    @given(scenes_and_states())
     def hold(drawn):
         hit = next_collision(*drawn)
         assert not (isinstance(hit, Collision) and BLIND[name](drawn[0], hit))
 
-    return printed(AssertionError, hold, 1000)[0]
+    with pytest.raises(AssertionError) as caught:
+        hold()
+    return next(text for text in caught.value.__notes__ if '"cmd"' in text)
 
 
 @pytest.mark.parametrize("name", deep_but(BLIND, "to a floor that moves"))
-def test_a_faulty_stepper_is_reported_in_few_and_short_numbers(name):
-    """At most twelve numbers that are not 0 or 1, all but three of at most six digits."""
+def test_a_faulty_stepper_is_reported_by_a_line_of_few_and_short_numbers(name):
+    """That of the step that fails. At most twelve are not 0 or 1, all but three of at most six digits."""
     # In a process of its own: Hypothesis also draws constants of all modules that are loaded.
     code = f"import sys; sys.path += ['tests']; import {__name__} as t; print(t.failing_line({name!r}))"
     command = [sys.executable, "-c", code]
-    line = subprocess.run(
-        command, cwd=Path(__file__).parents[1], capture_output=True, check=True, text=True
-    ).stdout
+    done = subprocess.run(command, cwd=Path(__file__).parents[1], capture_output=True, check=True, text=True)
+    line = next(part for part in done.stdout.splitlines() if '"cmd"' in part)
+    request = json.loads(line)
+    scene = from_data(request["scene"])
+    assert BLIND[name](scene, next_collision(scene, State(**request["state"]), request["t_end"]))
     numbers = [text for text in re.findall(r"-?[0-9][0-9.e+-]*", line) if float(text) not in (0.0, 1.0)]
     lengths = sorted(len(text.strip("-").replace(".", "")) for text in numbers)
     assert len(numbers) <= 12

@@ -15,7 +15,7 @@ import random
 import subprocess
 import sys
 import time
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from functools import partial
 from types import SimpleNamespace
 
@@ -33,7 +33,6 @@ from test_conformance_suite import made_up
 
 import fast
 import fast.__main__ as fast_server
-import reference
 import reference.__main__ as reference_server
 from conformance import plain, vectors
 from conformance.grading.agreement import grade
@@ -43,28 +42,35 @@ from conformance.mutants import COMMON, MUTANTS, PLAIN
 from conformance.suite import checks, reports, session
 from conformance.suite import run as suite
 from conformance.suite.checks import flows, requests, timing
-from conformance.suite.checks.flows import MAX_STATES
-from conformance.suite.checks.form import Draw, octaves, run_check
+from conformance.suite.checks.form import Draw, run_check
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import VERDICTS
 from conformance.suite.session import Limits, Session
-from scene import BadInput, Cap, Horizon, Mushroom, Rejected, State, Stem, from_data
+from scene import Cap, Horizon, Mushroom, Stem
 from scene.load import read_data
 from scene.protocol.messages import Timed
 
-SERVERS = ("reference", "fast", "conformance.plain")
+SERVERS = ("reference", "fast")
+FAST = {"flow": fast_server.carry, "timer": fast_server.clock}
+IN_PROCESS = {
+    "reference": partial(
+        answers_to, step=reference_server.step, follow=reference_server.follow, timer=reference_server.clock
+    ),
+    "fast": partial(answers_to, step=fast.next_collision, follow=fast_server.follow, **FAST),
+    "plain": partial(answers_to, step=plain.next_collision, follow=plain.trajectory, flow=plain.flow),
+}
 KITS = ("C++, next hit", "Python, implicit domain", "Python, intersection and reflection")
 LANGUAGES = ("Python", "C", "JavaScript", *KITS)
 # One vector in so many, to save time; `mushrooms check` grades them with all.
-EVERY = {"Python": 16, "C": 6, "JavaScript": 6, **dict(zip(KITS, (6, 24, 16), strict=True))}
-STRICT = ("-O3", "-Wall", "-Wextra", "-Werror")
+EVERY = {"Python": 16, "C": 12, "JavaScript": 6, **dict(zip(KITS, (6, 24, 16), strict=True))}
+STRICT = ("-O1", "-Wall", "-Wextra", "-Werror")
 
 
 @pytest.fixture(scope="module")
 def commands(tmp_path_factory) -> dict[str, Example]:
     """Return each program's command, or why it cannot run here."""
     folder = tmp_path_factory.mktemp("built")
-    ours = {name: Example((sys.executable, "-m", name), "") for name in SERVERS}
+    ours = {f"python -m {name}": Example((sys.executable, "-m", name), "") for name in SERVERS}
     return ours | find_examples(folder, STRICT) | find_kit_examples(folder, STRICT)
 
 
@@ -78,10 +84,13 @@ def runnable(example: Example) -> list[str]:
 
 @pytest.fixture
 def ask(commands):
-    """Return a program's answers to lines, which it gives and ends without an error."""
+    """Return answers to lines: of a server's steppers in this process, or of a program, without an error."""
 
     def call(name, *lines):
         sent = "".join((line if isinstance(line, str) else json.dumps(line)) + "\n" for line in lines)
+        if name in IN_PROCESS:
+            found = IN_PROCESS[name](sent.encode().splitlines(keepends=True))
+            return [json.loads(line) for line in found.splitlines()]
         run = subprocess.run(
             runnable(commands[name]), input=sent, capture_output=True, text=True, timeout=120, check=True
         )
@@ -110,7 +119,7 @@ def test_an_example_passes_at_level_core(language, commands, monkeypatch, tally)
     tally[f"{language}: vectors"] += len(chosen)
 
 
-@pytest.mark.parametrize("name", [*SERVERS, *LANGUAGES])
+@pytest.mark.parametrize("name", [*IN_PROCESS, *LANGUAGES])
 def test_the_edges_of_the_protocol(name, ask):
     edges = [*EDGES, *([] if name == "fast" else LATE_EDGES)]  # fast refuses all times so late, and says so
     answers = ask(name, *(question for question, _ in edges))
@@ -165,7 +174,7 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize("name", [*SERVERS, *LANGUAGES])
+@pytest.mark.parametrize("name", [*IN_PROCESS, *LANGUAGES])
 def test_bad_lines_are_rejected_and_the_session_goes_on(name, ask):
     lines = [line for bad, _ in [*NAMELESS, *BAD] for line in (bad, GOOD)]
     *answers, fast_one = ask(name, *lines, started(vx=1e200))
@@ -182,14 +191,16 @@ def test_bad_lines_are_rejected_and_the_session_goes_on(name, ask):
     )
 
 
-@pytest.mark.parametrize("name", SERVERS[:2])
+@pytest.mark.parametrize("name", SERVERS)
 def test_session(name, ask):
     numbers = [0.1, 5e-324, -0.0, 1.7976931348623157e308, 2.0**53 + 2, 1 / 3, -1e-310]
     lines = {"cmd": "start", "protocol": 1}, {"cmd": "echo", "values": numbers}, GOOD
     zeros = '{"cmd":"echo","values":[-0,0]}', '{"cmd":"dance","seq":-0,"collisions":-0}'
     timed = {"cmd": "time", "seq": 1, **REST, "collisions": 2, "repeat": 1}
     other = {"cmd": "start", "protocol": 2}
-    found = ask(name, *lines, *zeros, timed, other, {"cmd": "stop"}, {"cmd": "echo", "values": []})
+    found = ask(
+        f"python -m {name}", *lines, *zeros, timed, other, {"cmd": "stop"}, {"cmd": "echo", "values": []}
+    )
     start, echo, one, zero, none, rest, refused = found  # and nothing after `stop`
     assert start["name"] == name
     assert set(start["tables"]) == {"cap", "stem", "mushroom"}
@@ -224,19 +235,11 @@ def test_what_the_machine_refuses_is_owned_to_and_the_session_goes_on(error, tol
 
 
 N_LINES = int(os.environ.get("MUSHROOMS_LINES", "300"))
-N_RUNS = int(os.environ.get("MUSHROOMS_RUNS", "2"))
+N_RUNS = int(os.environ.get("MUSHROOMS_RUNS", "1"))
 LIMIT = 120.0  # seconds for one line: the time limit of `mushrooms check`
-FAST = {"flow": fast_server.carry, "timer": fast_server.clock}
-IN_PROCESS = {
-    "reference": partial(
-        answers_to, step=reference_server.step, follow=reference_server.follow, timer=reference_server.clock
-    ),
-    "fast": partial(answers_to, step=fast.next_collision, follow=fast_server.follow, **FAST),
-    "plain": partial(answers_to, step=plain.next_collision, follow=plain.trajectory, flow=plain.flow),
-}
 
 
-@pytest.mark.parametrize("name", IN_PROCESS)
+@pytest.mark.parametrize("name", deep_but(IN_PROCESS, *SERVERS))
 def test_a_server_answers_every_line_with_one_line(name, tally):
     IN_PROCESS[name](map(msgspec.json.encode, fuzz.WARM_UP))  # compiles
     for line in fuzz.lines(1, N_LINES, fuzz.requests):
@@ -354,14 +357,27 @@ def verdict_on(answer, name, seed=1):
         return run_check(next(check for check in checks.checks_of() if check.name == name), session, seed)
 
 
-def test_an_honest_server_holds_every_check():
+LONGEST = (
+    "changed-questions",
+    "bad-states",
+    "edges",
+    "bad-scenes",
+)  # of an honest server, which is asked all
+
+
+@pytest.mark.parametrize("left_out", deep_but([LONGEST, ()], LONGEST))
+def test_an_honest_server_holds_every_check(left_out, monkeypatch):
     """A run of one that offers everything has all these cases, and no more."""
+    left_out = [f"promise/{name}" for name in left_out]
+    chosen = [check for check in checks.checks_of() if check.name not in left_out]
+    monkeypatch.setattr(suite, "checks_of", lambda *_: chosen)
     run = suite.check(
         faulty(lambda request, answer: answer(request)), groups=["static-cap", *checks.GROUPS], seed=1
     )
     few = ("profile/mean-growth", "profile/reversal")  # particles, to tell anything
     expected = dict.fromkeys(suite.OTHER_CASES, "pass") | dict.fromkeys(few, "declined")
-    assert {result.id: result.verdict for result in run.results if not result.level} == expected
+    found = {result.id: result.verdict for result in run.results if not result.level}
+    assert found == {name: verdict for name, verdict in expected.items() if name not in left_out}
     assert (run.objections(), run.exit_code()) == ([], 0)
     assert str(run.scope()).startswith(
         f"core {run.corpus}; cap; constant; step; trajectory, flow, time, mushroom, stem, fourier, bang-bang"
@@ -386,10 +402,12 @@ ALIKE = (
     *("mouths-below-0.001-shut", "mouths-below-1e-05-shut"),
     *("mouths-above-0.999-whole", "mouths-above-0.99999-whole"),
     *("ties-within-0.0001-by-order", "ties-within-1e-08-by-order"),
-    *("edge-wider-by-0.0001", "edge-wider-by-1e-06", "slopes-from--16-on"),
+    *("edge-wider-by-1e-06", "slopes-from--16-on"),
     *("scenes-by-1-samples", "absent-t-as-0", "absent-x-as-0", "absent-y-as-0", "absent-vx-as-0"),
     *("loose-paths", "loose-flows", "at-the-end-unchecked", "no-base-in-the-mouth-of-paths"),
     *("strictly-on-base", "strictly-on-left", "strictly-on-floor"),
+    *("absent-is-arc-in-paths", "absent-is-arc-in-flows", "captured-from-the-start", "captured-to-the-end"),
+    *("first-time-for-all", "answers-without-wall", "open-flows", "edge-wider-by-2.98023e-08"),
 )
 
 
@@ -447,29 +465,15 @@ def test_questions_are_a_strategy_too():
     assert isinstance(scene, Mushroom | Cap | Stem)
 
 
-def test_bad_states_are_bad_and_good_ones_good_by_the_reference(tally):
-    """What a check asks must be so: the proving stepper says the same, and leaves nothing open."""
-    for scene, request, why in requests.bad_states(Draw("1"), "step"):
-        start = State(**request["state"])
-        outcome = reference.next_collision(scene, start, request["t_end"])
-        assert isinstance(outcome, Rejected) == bool(why), (scene, request, why, outcome)
+@pytest.mark.parametrize("asks", [requests.bad_states, requests.bad_scenes])
+def test_what_is_asked_as_bad_is_bad_and_the_rest_is_good(asks, tally):
+    """The proving stepper says the same of what a check asks, and leaves nothing open."""
+    for _, request, why in asks(Draw("1"), "step"):
+        answer = json.loads(IN_PROCESS["reference"]([msgspec.json.encode({**request, "seq": 1}) + b"\n"]))
+        assert (answer["outcome"] == "rejected") == bool(why), (request, why, answer)
+        assert answer["outcome"] != "undecided", request
         tally["bad" if why else "good"] += 1
     assert min(tally.values()) > 100
-
-
-def test_bad_scenes_are_bad_and_good_ones_good_by_proof(tally):
-    for data, _, why in requests.bad_scenes(Draw("1"), "step"):
-        with pytest.raises(BadInput) if why else nullcontext():
-            from_data(data)
-        tally["bad" if why else "good"] += 1
-    assert min(tally.values()) > 100
-
-
-def test_no_size_is_a_constant():
-    """Two seeds share no size, and each octave up to the bound is asked about."""
-    one, other = (list(octaves(Draw(str(seed)), 1, MAX_STATES)) for seed in SEEDS[:2])
-    assert not set(one) & set(other)
-    assert [int(size).bit_length() for size in one] == list(range(12, 0, -1))
 
 
 def flow_of(name: str):
@@ -507,7 +511,7 @@ SMALL, SLOW, LITTLE = (flows.Size(*size) for size in ((100, 1000.0, 0.08), (400,
         ("none", "mean-growth", SMALL, "declined"),
         ("none", "reversal", SMALL, "declined"),
         ("one-too-few", "work-identity", SMALL, "wrong-format"),
-        ("one-too-few", "captured-share", SMALL, "wrong-format"),
+        pytest.param("one-too-few", "captured-share", SMALL, "wrong-format", marks=pytest.mark.deep),
     ],
 )
 def test_ensembles_tell_a_mutant_from_an_honest_stepper(monkeypatch, name, case, size, verdict):

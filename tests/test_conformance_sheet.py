@@ -145,7 +145,7 @@ def test_wrong_answers_fail_and_missing_ones_are_declined(sheet, tmp_path):
     assert str(first.seq) in by_case[first.case].why
 
 
-@pytest.mark.parametrize("form", ["decimal", "hexadecimal", "fortran"])
+@pytest.mark.parametrize("form", deep_but(["decimal", "hexadecimal", "fortran"], "hexadecimal", "fortran"))
 def test_csv_answers_are_graded_alike(sheet, tmp_path, form):
     spell = {"decimal": repr, "hexadecimal": float.hex, "fortran": lambda x: f"{x:.17E}".replace("E", "D")}[
         form

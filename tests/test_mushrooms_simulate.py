@@ -28,7 +28,6 @@ import fast
 import theory
 from conformance.audit import session
 from conformance.audit.runs import SCENES
-from conformance.files import sealed, unsealed
 from fast.kernel.follow import LANE_ROWS
 from mushrooms import audit_ensemble, bench, orbits, output, questions
 from mushrooms.audit_ensemble import Options
@@ -258,16 +257,6 @@ def test_a_mean_has_the_same_bits_in_blocks_of_any_size_and_order():
 )
 def test_a_mean_that_nobody_knows_is_none(gains, wanted):
     assert gain_of(lambda: [np.array(gains).reshape(-1, 1)]) == wanted
-
-
-def test_a_seal_tells_every_flipped_bit(tmp_path):
-    path = tmp_path / "a"
-    content = sealed(b"numbers")
-    path.write_bytes(content)
-    assert unsealed(path) == b"numbers"
-    for i in range(8 * len(content)):
-        path.write_bytes(content[: i // 8] + bytes([content[i // 8] ^ 1 << i % 8]) + content[i // 8 + 1 :])
-        assert unsealed(path) is None
 
 
 def test_a_block_is_reported_at_once_and_two_are_in_memory(tmp_path, monkeypatch):

@@ -247,7 +247,7 @@ def adiabatic_model(n: int, seed: int, most: int = 9) -> tuple[Floats, NDArray[n
     return s, n_captures
 
 
-N = 100_000
+N = 40_000
 
 
 @pytest.fixture(scope="module")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import hashlib
 import json
 import os
+import shutil
 import time
 from pathlib import Path
 
@@ -24,6 +26,7 @@ from conformance.files import sealed, unsealed
 from fast.kernel import follow as kernel
 from fast.kernel import records
 from mushrooms import simulate
+from mushrooms.main import run
 from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct
 from mushrooms.store import run as stored
@@ -37,8 +40,8 @@ STEM = to_data(load("fermi-ulam"))
 
 
 def arguments(folder, *more, n=N, block=64, name="fermi-ulam"):
-    run = ["simulate", name, "--energy", ENERGY, "--seed", SEED, "--threads", 1, "--json"]
-    return [*run, "--particles", n, "--out", folder, *(["--block", block] if block else []), *more]
+    words = ["simulate", name, "--energy", ENERGY, "--seed", SEED, "--threads", 1, "--json"]
+    return [*words, "--particles", n, "--out", folder, *(["--block", block] if block else []), *more]
 
 
 @pytest.fixture(scope="module")
@@ -55,11 +58,20 @@ def digest_of(ended):
     return ended.data()["sha256"]
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Return the folder of a finished run, to be copied."""
+    folder = tmp_path_factory.mktemp("written")
+    with contextlib.chdir(folder), pytest.raises(SystemExit, match="0"):
+        run([str(word) for word in arguments("run")])
+    return folder / "run"
+
+
 @pytest.fixture
-def finished(command_line, tmp_path):
-    """Return the folder of a finished run."""
-    digest_of(command_line(*arguments(tmp_path)))
-    return tmp_path
+def finished(written, tmp_path, monkeypatch):
+    """Return the folder of a finished run, as the run was told it."""
+    monkeypatch.chdir(tmp_path)
+    return shutil.copytree(written, Path("run"))
 
 
 @pytest.fixture
@@ -150,23 +162,22 @@ def emptied(_content):
     return b""
 
 
-@pytest.mark.parametrize(
-    ("damage", "name"),
-    [
-        (truncated, "ensemble.zarr/t/c/2"),
-        (flipped, "ensemble.zarr/wall_counts/c/2/0"),
-        (emptied, "ensemble.zarr/outcome/c/2"),
-        (truncated, "blocks/2.marker"),
-        (flipped, "blocks/2.marker"),
-        (truncated, "ensemble.zarr/t/zarr.json"),
-        (truncated, "ensemble.zarr/zarr.json"),
-        (truncated, f"blocks/{DESCRIPTION}"),
-    ],
-)
-def test_a_damaged_file_is_mended_and_its_block_followed_again(
-    command_line, finished, followed, whole, damage, name
-):
+DAMAGES = [
+    (truncated, "ensemble.zarr/t/c/2"),
+    (flipped, "blocks/2.marker"),
+    (truncated, "ensemble.zarr/zarr.json"),
+    (truncated, f"blocks/{DESCRIPTION}"),
+    (flipped, "ensemble.zarr/wall_counts/c/2/0"),
+    (emptied, "ensemble.zarr/outcome/c/2"),
+    (truncated, "blocks/2.marker"),
+    (truncated, "ensemble.zarr/t/zarr.json"),
+]
+
+
+@pytest.mark.parametrize("case", deep_but(DAMAGES, *DAMAGES[:4]))
+def test_a_damaged_file_is_mended_and_its_block_followed_again(command_line, finished, followed, whole, case):
     """Of one array's description nothing is followed again; that of the run is there twice."""
+    damage, name = case
     path, is_block = finished / name, "2" in name
     content = path.read_bytes()
     path.write_bytes(damage(content))
@@ -202,7 +213,7 @@ def test_the_digest_does_not_take_a_chunk_that_changes_at_the_last_moment(
     assert_refused(command_line(*arguments(tmp_path)), "block 1 of", "damaged")
 
 
-@pytest.mark.parametrize("n_writes", [0, 5, 22, 40])
+@pytest.mark.parametrize("n_writes", deep_but([0, 5, 22, 40], 0, 22))
 def test_a_full_disk_leaves_a_run_that_goes_on(command_line, tmp_path, monkeypatch, whole, n_writes):
     """Whichever file the disk has no room for: of the description, a chunk, a marker."""
     full_disk(monkeypatch, n_writes)
@@ -298,7 +309,7 @@ def test_the_time_of_day_decides_nothing(command_line, tmp_path, monkeypatch, wh
 def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, tmp_path, break_off):
     """Runs that are broken off, harmed, widened and lengthened at random."""
     random, errors = np.random.default_rng(11), (KeyboardInterrupt, OSError(errno.EIO, "input/output error"))
-    for number in range(int(os.environ.get("MUSHROOMS_HARMS", "4"))):
+    for number in range(int(os.environ.get("MUSHROOMS_HARMS", "2"))):
         folder, n, cycles, block = tmp_path / str(number), 20, 1, int(random.integers(5, 40))
         for _ in range(6):
             n, cycles = n + int(random.integers(0, 40)), cycles + int(random.integers(0, 2))
@@ -385,7 +396,7 @@ def test_a_run_is_lengthened_and_widened_to_the_bits_of_one_at_once(command_line
     assert run.takes_part.values.tolist() == wanted.takes_part().tolist()
 
 
-@pytest.mark.parametrize("n_written", [0, 1, 5, 100])
+@pytest.mark.parametrize("n_written", deep_but([0, 1, 5, 100], 1, 100))
 def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
     command_line, tmp_path, followed, monkeypatch, n_written
 ):

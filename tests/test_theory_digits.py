@@ -15,48 +15,10 @@ import theory
 from scene import Fourier, Mushroom, load
 from theory import Cycle, Prediction, mean_of, moments, precision, predict, prediction
 from theory.adiabatic import captures
-from theory.chebyshev import Grid
 from theory.critical import MANY_BITS, solve_rising
 
 # m1 of the moving cap to 100 digits, by sums of all cosines and every Newton step at full precision.
 M1 = "0.1227679649373872211752779164798956665418006027565599953695922200419445092518695629088300949849377621"
-
-
-@pytest.fixture(scope="module")
-def ctx():
-    found = MPContext()
-    found.dps = 120
-    return found
-
-
-def values(ctx, n):
-    """Return n + 1 numbers that fall from 1 to 1e-100."""
-    return [ctx.mpf(10) ** (-100 * j / ctx.mpf(n)) * ((7 * j) % 11 - 5) for j in range(n + 1)]
-
-
-def worst(found, truth):
-    return max(abs(a - b) for a, b in zip(found, truth, strict=True))
-
-
-@pytest.mark.parametrize("n", [208, 216])
-def test_sums_by_halving_are_the_sums_of_all(ctx, n):
-    grid, given = Grid(ctx, n), values(ctx, n)
-    found = grid._cosine_sums(given)
-    assert worst(found, grid._sums_of_all(given)) < ctx.mpf(10) ** -115
-    direct = ctx.fsum(v * ctx.cos(ctx.pi * j * 5 / n) for j, v in enumerate(given))
-    assert abs(direct - found[5]) < ctx.mpf(10) ** -115
-
-
-def test_halves_put_together_wrongly_would_be_seen(ctx):
-    class Unmirrored(Grid):
-        """Does not turn the second half round."""
-
-        def _odd_sums(self, given):
-            found = super()._odd_sums(given)
-            return found[: len(found) // 2] + found[len(found) // 2 :][::-1]
-
-    grid, given = Unmirrored(ctx, 208), values(ctx, 208)
-    assert worst(grid._cosine_sums(given), grid._sums_of_all(given)) > 1e-3
 
 
 def test_a_root_has_all_its_digits_and_is_found_with_few():

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.depth import deep_but
 from support.refusals import one_line
 
 import theory
@@ -349,8 +350,10 @@ def test_angles_scale(exponent: int) -> None:
     assert angle == pytest.approx(theory.sin_phi_hat(mpmath.fp, *near), rel=1e-15)
 
 
-@pytest.mark.parametrize("name", ["moving-cap", "moving-cap-reversed", "retraced-arc"])
-@pytest.mark.parametrize("n", [10, 100, 300])
+@pytest.mark.parametrize(
+    "name", deep_but(["moving-cap", "moving-cap-reversed", "retraced-arc"], "moving-cap-reversed")
+)
+@pytest.mark.parametrize("n", deep_but([10, 100, 300], 10, 300))
 def test_sums_keep_phase_volume_where_they_are_tilted_to_it(name: str, n: int) -> None:
     found = theory.energies(load(name))
     sums = theory.sum_of_cycles(found, n, q=-1.0)

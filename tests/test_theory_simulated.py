@@ -24,7 +24,7 @@ from theory.finite_energy.one_cycle import FiniteEnergy
 LEVEL = 0.01
 NEAR = 3.0  # standard errors within which one figure alone is to be
 SCENES = (*MEASURED, "fixed-cap-clockwise", "moving-cap-reversed")
-QUICK = {1e4: 4000, 1e5: 4000, 1e6: 2000, 1e7: 500}
+QUICK = {1e4: 2000, 1e5: 1500, 1e6: 500, 1e7: 200}
 FULL = {1e4: 100_000, 1e5: 100_000, 1e6: 100_000, 1e7: 80_000, 1e8: 40_000, 1e9: 16_000}
 SEED = 4000
 

@@ -77,7 +77,7 @@ def bounced(p, t, wall, slope, misprinted, has_wrong_sign):
     return vx - 2 * (vn - u) * nx, vy - 2 * (vn - u) * ny
 
 
-@njit
+@njit(cache=True)
 def cycle(p, t_end, slope, misprinted, has_wrong_sign, leak):
     """Follow a particle through a cycle; return its energy, and t_in and t_out of the stay at t = pi."""
     t, wall, begin, end, t_in, t_out = 0.0, -1, np.inf, np.inf, np.nan, np.nan

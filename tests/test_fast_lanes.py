@@ -193,7 +193,7 @@ def worst_errors(scene, random, n):
     """Return how far polynomials are from laws: value over its size, rate and mean rate over their terms."""
     compiled, worst = compile_scene(scene), np.zeros(3)
     degree = (0,) * (SERIES if compiled.laws[SHARED, OMEGA] > 0.0 else PARABOLA)
-    p = pieces.pieces_of(compiled, len(degree))
+    p = pieces.pieces_of(scene, len(degree))
     for t in random.uniform(-7 * p.period, 7 * p.period, n):
         piece, reference, low = from_python(piece_at)(p, t, 0.0)
         near, far = np.sort(random.choice([-1.0, 1.0, *random.uniform(-1, 1, 2)], 2)) * p.limits[piece]
@@ -286,7 +286,7 @@ def test_lanes_know_no_phase_that_the_careful_step_calls_lost():
 @pytest.mark.usefixtures("uncached")
 def test_laws_that_take_too_many_pieces_are_left_to_careful_steps(monkeypatch):
     monkeypatch.setattr(pieces, "MAX_PIECES", 8)
-    assert pieces.pieces_of(compile_scene(DEEP[0]), SERIES) is None
+    assert pieces.pieces_of(DEEP[0], SERIES) is None
     assert laws_in_lanes(DEEP[0]).pieces.until < 0.0
 
 

@@ -155,7 +155,6 @@ class LaneRound:
     Attributes:
         compiled: the scene's numbers.
         is_disk: whether particles move unfolded through the base: only the arc is met. So they do in a cap.
-        serves: the longest time that a piece of its laws serves.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -163,7 +162,6 @@ class LaneRound:
         self.is_disk = bool(self.compiled.table == records.CAP)
         self.in_lanes = laws_in_lanes(scene)
         self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6))))
-        self.serves = float(np.diff(self.in_lanes.pieces.begins, append=self.in_lanes.pieces.period).max())
         self.anchors = np.zeros(ANCHORS_SHAPE)
         self.pool, self.spare = np.zeros(records.POOL_SIZE), np.zeros(records.POOL_SIZE)
 

@@ -26,11 +26,12 @@ from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, PARABOLA, SERIES, TWO_WAVE
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, BANG_BANG, BEND, CONSTANT, DEPTH, FASTEST, FOURIER, HIGHEST, KIND, KNOTS, LEVEL, LOWEST,
-    N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled,
+    N_HARMONICS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled,
     FloatArray, LaneWaves, LawLimits, LawsInLanes, Pieces,
 )  # fmt: skip
 from fast.units import compile_scene
-from scene import Scene
+from scene import Scene, tables
+from scene.laws import breakpoints, is_constant
 
 SHALLOW = 0.25  # of its mean: see `waves_of`
 MAX_PIECES = 2**15
@@ -64,7 +65,7 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
         pieces = NO_PIECES._replace(period=period, until=_until(laws, period))
     else:
         form = SERIES if (laws[:SHARED, KIND] == FOURIER).any() else PARABOLA
-        pieces = pieces_of(compiled, form) or NO_PIECES
+        pieces = pieces_of(scene, form) or NO_PIECES
     return LawsInLanes(
         compiled,
         limits_of(compiled),
@@ -151,14 +152,14 @@ def least_of(compiled: Compiled, row: int | np.integer) -> float:
     return float(bounds[row, LOWEST])
 
 
-def pieces_of(compiled: Compiled, degree: int) -> Pieces | None:
+def pieces_of(scene: Scene, degree: int) -> Pieces | None:
     """Return a scene's laws, one of which moves, as polynomials of a degree; None if it takes too many."""
-    laws = compiled.laws
-    period, origin = _period_and_origin(laws)
+    compiled = compile_scene(scene)
+    period, origin = _period_and_origin(compiled.laws)
     longest = reach(compiled, degree)
     if not longest > 0.0:
         return None
-    knots = sorted(_knots(laws, period, origin))
+    knots = sorted(_knots(scene, period, origin))
     edges = [Fraction(0), *knots, period]
     cuts: list[Cut] = []
     for a, b in pairwise(edges):
@@ -221,12 +222,7 @@ def _period_and_origin(laws: FloatArray) -> tuple[Fraction, Fraction]:
     return 4 * HALF_PI / omega, Fraction(0)
 
 
-def _knots(laws: FloatArray, period: Fraction, origin: Fraction) -> set[Fraction]:
+def _knots(scene: Scene, period: Fraction, origin: Fraction) -> set[Fraction]:
     """Return the times since the origin, inside the period, of all knots and of the middles of legs."""
-    found = set()
-    for row in laws[:SHARED]:
-        if row[KIND] == BANG_BANG:
-            times = [Fraction(t) - origin for t in row[KNOTS : KNOTS + int(row[N_KNOTS])]]
-            middles = [(a + b) / 2 for a, b in pairwise(times)]
-            found |= {t % period for t in (*times, *middles)} - {Fraction(0)}
-    return found
+    moving = (law for law in tables.laws(scene).values() if not is_constant(law))
+    return {(t - origin) % period for law in moving for t in breakpoints(law)} - {Fraction(0)}

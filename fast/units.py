@@ -17,7 +17,7 @@ import sys
 from copy import copy
 from fractions import Fraction
 from functools import lru_cache
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
 import msgspec
@@ -84,13 +84,11 @@ def _omega(law: Fourier) -> tuple[float, float]:
 
 def _row(law: Law) -> list[float]:
     if isinstance(law, Fourier) and not is_constant(law):
-        n = max(len(law.cos), len(law.sin))
-        cos = list(law.cos) + [0.0] * (n - len(law.cos))
-        sin = list(law.sin) + [0.0] * (n - len(law.sin))
-        return [FOURIER, law.mean, _omega(law)[0], n, *cos, *sin]
+        harmonics = list(zip_longest(law.cos, law.sin, fillvalue=0.0))
+        cos, sin = zip(*harmonics, strict=True)
+        return [FOURIER, law.mean, _omega(law)[0], len(harmonics), *cos, *sin]
     if isinstance(law, BangBang) and not is_constant(law):
-        times = [knot[0] for knot in law.knots]
-        values = [knot[1] for knot in law.knots]
+        times, values = zip(*law.knots, strict=True)
         accelerations = [
             4 * (Fraction(v1) - Fraction(v0)) / (Fraction(t1) - Fraction(t0)) ** 2
             for (t0, v0), (t1, v1) in pairwise(law.knots)

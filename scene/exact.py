@@ -66,7 +66,7 @@ def half_angle(law: Law, order: int = 0) -> tuple[Polynomial, int]:
     return total, n
 
 
-Polynomial = list[Fraction]
+Polynomial = list[Fraction]  # its last number is not 0
 
 
 def trimmed(p: Polynomial) -> Polynomial:
@@ -85,8 +85,6 @@ def add(p: Polynomial, q: Polynomial) -> Polynomial:
 
 def multiply(p: Polynomial, q: Polynomial) -> Polynomial:
     """Return p q."""
-    if not p or not q:
-        return []
     out = [Fraction(0)] * (len(p) + len(q) - 1)
     for i, a in enumerate(p):
         if a:
@@ -117,8 +115,6 @@ def at(p: Polynomial, x: Fraction) -> Fraction:
 
 def _primitive(p: Polynomial) -> Polynomial:
     # A positive multiple with coprime integer coefficients: keeps the chain's numbers small.
-    if not p:
-        return p
     common = lcm(*(a.denominator for a in p))
     integers = [a.numerator * (common // a.denominator) for a in p]
     shared = gcd(*integers)
@@ -168,7 +164,6 @@ class Sturm:
 
 def negative_point(p: Polynomial, a: Fraction, b: Fraction) -> Fraction | None:
     """Return a point of [a, b] at which p < 0, or None when there is none (proof)."""
-    p = trimmed(p)
     if not p:
         return None
     sturm = Sturm(p)
@@ -189,11 +184,9 @@ def negative_point(p: Polynomial, a: Fraction, b: Fraction) -> Fraction | None:
 
 def vanishes(p: Polynomial, a: Fraction, b: Fraction) -> bool:
     """Tell whether p has a root in the closed interval [a, b]."""
-    p = trimmed(p)
     return not p or at(p, a) == 0 or at(p, b) == 0 or Sturm(p).n_roots(a, b) > 0
 
 
 def root_bound(p: Polynomial) -> Fraction:
     """Return a bound on |x| over all roots (Cauchy)."""
-    p = trimmed(p)
     return 1 + max((abs(a / p[-1]) for a in p[:-1]), default=Fraction(0))

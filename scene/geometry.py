@@ -46,10 +46,6 @@ class TableAt(NamedTuple):
         """Return a length [length] that no chord exceeds, except in a stem that is wider below."""
         return 2 * self.r + 2 * self.w + self.h
 
-    def rounded(self) -> TableAt:
-        """Return the same table with every number rounded to binary64."""
-        return TableAt(self.scene, *(float(number) for number in self[1:]))
-
     def cap_area(self) -> Any:
         """Return the area of the half disk [length^2], 0 in a stem."""
         return 0.5 * math.pi * self.r * self.r
@@ -196,7 +192,8 @@ def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
 
 def rounded(scene: Scene, t: float) -> TableAt:
     """Evaluate a table to DIGITS digits and round once: the same binary64 numbers on every machine."""
-    return table_at(decimals(DIGITS), scene, t).rounded()
+    _, *numbers = table_at(decimals(DIGITS), scene, t)
+    return TableAt(scene, *map(float, numbers))
 
 
 def placed(scene: Scene, state: State, wall: Wall, how: str) -> str:

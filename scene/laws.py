@@ -71,10 +71,8 @@ class Fourier(
 
     def harmonics(self) -> list[tuple[int, float, float]]:
         """Return (k, cosine amplitude, sine amplitude) for every harmonic present."""
-        n = max(len(self.cos), len(self.sin))
-        cos = self.cos + (0.0,) * (n - len(self.cos))
-        sin = self.sin + (0.0,) * (n - len(self.sin))
-        return [(k, c, s) for k, (c, s) in enumerate(zip(cos, sin, strict=True), 1) if c or s]
+        pairs = itertools.zip_longest(self.cos, self.sin, fillvalue=0.0)
+        return [(k, c, s) for k, (c, s) in enumerate(pairs, 1) if c or s]
 
 
 class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", forbid_unknown_fields=True):

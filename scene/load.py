@@ -104,10 +104,11 @@ def _in_words(error: Exception, data: Any) -> str:
     if isinstance(cause, InvalidScene):
         # A law does not know its parameter, so its message names its kind.
         return re.sub(r"^(fourier|bang-bang)(?=[. ])", place, str(cause)) if place else str(cause)
+    tags = ", ".join(_kinds(place.removeprefix("table")))
     if place in ("table", *(f"{name}.kind" for name in PARAMETERS)):
-        return f"{place} = {shown(_at(data, names))}, must be one of {_tags(place.removeprefix('table'))}"
+        return f"{place} = {shown(_at(data, names))}, must be one of {tags}"
     if "required field `table`" in text or "required field `kind`" in text:
-        return f"{place or 'scene'} has no `{'kind' if place else 'table'}`, must be one of {_tags(place)}"
+        return f"{place or 'scene'} has no `{'kind' if place else 'table'}`, must be one of {tags}"
     told = re.match(r"Object (contains unknown|missing required) field `(.*?)`$", text)
     if told:
         return _fields_in_words(place, _at(data, names), told[1] == "contains unknown", told[2])
@@ -120,10 +121,6 @@ def _kinds(place: str) -> dict[str, Any]:
     """Return the laws by their kinds, or at the top the tables by theirs."""
     valid = (Fourier, BangBang) if place else (Cap, Stem, Mushroom)
     return {str(kind.__struct_config__.tag): kind for kind in valid}
-
-
-def _tags(place: str) -> str:
-    return ", ".join(_kinds(place))
 
 
 def _fields_in_words(place: str, given: Any, is_unknown: bool, field: str) -> str:

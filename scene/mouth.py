@@ -108,14 +108,12 @@ def _zeros(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
     series = _slope(w(places), r(places))[0] @ TO_SERIES
     sizes = np.abs(series)
     may_vanish = (sizes[:, 0] <= sizes[:, 1:].sum(axis=1)) & np.isfinite(sizes).all(axis=1)
-    found = []
+    found = [np.empty(0)]
     for k in np.flatnonzero(may_vanish):
         kept = np.flatnonzero(sizes[k] > 2.0**-52 * sizes[k].max())
         if len(kept) and kept[-1] > 0:
             zeros = chebyshev.chebroots(series[k, : kept[-1] + 1]).real
             found.append(middle[k] + half[k] * zeros[np.abs(zeros) <= 1.0 + 2.0**-20])
-    if not found:
-        return np.empty(0)
     phases = np.concatenate(found)
     for _ in range(3):
         slope, rate = _slope(w(phases), r(phases))

@@ -52,9 +52,7 @@ class _Table(
         Raises:
             InvalidScene: one line naming the parameter, the value or the time, and the bound.
         """
-        for field in self.__struct_fields__:
-            if field not in PARAMETERS:
-                continue
+        for field in (name for name in PARAMETERS if name in self.__struct_fields__):
             given = listed(getattr(self, field))
             if isinstance(given, Fourier | BangBang) or (given is None and field in self.optional):
                 continue

@@ -198,7 +198,7 @@ def worst_errors(scene, random, n):
     """Return how far polynomials are from laws: value over its size, rate and mean rate over their terms."""
     compiled, worst = compile_scene(scene), np.zeros(3)
     degree = (0,) * (SERIES if compiled.laws[SHARED, OMEGA] > 0.0 else PARABOLA)
-    p = pieces.pieces_of(compiled, len(degree))
+    p = pieces.pieces_of(scene, len(degree))
     for t in random.uniform(-7 * p.period, 7 * p.period, n):
         piece, reference, low = from_python(piece_at)(p, t, 0.0)
         near, far = np.sort(random.choice([-1.0, 1.0, *random.uniform(-1, 1, 2)], 2)) * p.limits[piece]

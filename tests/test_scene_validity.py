@@ -373,7 +373,7 @@ def test_rates_and_normals_are_derivatives_of_the_gap(scene, t):
         ]
         f_x, f_y, f_t = map(float, slopes)
         size = math.hypot(f_x, f_y)
-        assert now.rounded().normal(wall, float(x), float(y)) == pytest.approx((f_x / size, f_y / size))
+        assert rounded(scene, t).normal(wall, float(x), float(y)) == pytest.approx((f_x / size, f_y / size))
         assert now.receding(wall, float(y)) == pytest.approx(f_t / size)
         assert float(now.gap_rate(wall, x, y, 3, -2)) == pytest.approx(3 * f_x - 2 * f_y + f_t)
 

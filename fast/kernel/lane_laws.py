@@ -76,13 +76,7 @@ def piece_at(pieces, t, t_low):
     """Return the number of the piece that serves at a time, and its reference time as a sum of two floats."""
     origin, period, period_low = pieces.origin, pieces.period, pieces.period_low
     n_periods, tau = whole_periods(origin, period, period_low, t, t_low)
-    low, high = 0, pieces.begins.shape[0]
-    while high - low > 1:
-        middle = (low + high) // 2
-        if pieces.begins[middle] <= tau:
-            low = middle
-        else:
-            high = middle
+    low = max(np.searchsorted(pieces.begins, tau, side="right") - 1, 0)
     p, e = two_product(n_periods, period)
     reference, f = two_sum(p, pieces.references[low, 0])
     return low, reference, f + (e + n_periods * period_low + pieces.references[low, 1])

@@ -33,9 +33,9 @@ from fast.kernel.arithmetic import (
 from fast.kernel.compiling import kernel, part
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, BANG_BANG, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, IS_SHORT, KIND, KNOTS, LEVEL,
-    N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, PHASE, PHASE_ERROR, RADIUS, RATE, ROOM,
-    ROOM_LOW, SHARED, SINE, SINE_LOW, SLOPE, TERMS, TURN, TURN_TIME, VALUE, VALUE_LOW, WIDTH,
+    AMPLITUDES, BANG_BANG, CONSTANT, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, IS_SHORT, KIND, KNOTS,
+    LEVEL, N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, PHASE, PHASE_ERROR, RADIUS, RATE,
+    ROOM, ROOM_LOW, SHARED, SINE, SINE_LOW, SLOPE, TERMS, TURN, TURN_TIME, VALUE, VALUE_LOW, WIDTH,
 )  # fmt: skip
 
 # Part of its mean below which a size's terms cancel so far that their rounding shows in it. The terms of one
@@ -110,11 +110,16 @@ def phase_room(laws, t):
 
 @kernel
 def set_anchors(laws, anchors, t_hi, t_lo):
-    """Anchor all four laws at t; False when t is out of reach."""
+    """Anchor all four laws at t; False when t is out of reach.
+
+    A constant law has a value alone: what else is asked of it is the 0 that anchors begin with.
+    """
     if not set_phases(laws, anchors, t_hi, t_lo):
         return False
     for row in (RADIUS, WIDTH, DEPTH, SLOPE):
-        if laws[row, KIND] != BANG_BANG:
+        if laws[row, KIND] == CONSTANT:
+            anchors[row, VALUE] = laws[row, LEVEL]
+        elif laws[row, KIND] == FOURIER:
             set_waves(laws, anchors, row)
         elif not set_leg(laws, anchors, row, t_hi, t_lo):
             return False
@@ -145,10 +150,7 @@ def add_product(total, low, a, b, b_low):
 
 @part
 def set_waves(laws, anchors, row):
-    """Anchor a Fourier law from the phases stored; its terms may cancel, hence sums of two floats.
-
-    A constant law is one without harmonics.
-    """
+    """Anchor a Fourier law from the phases stored; its terms may cancel, hence sums of two floats."""
     n = int(laws[row, N_HARMONICS])
     f, f_low = laws[row, LEVEL], 0.0
     rate, rate_low = 0.0, 0.0

@@ -6,6 +6,7 @@ answers `AnsweredCollision` without them.
 """
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from importlib.metadata import version
 from typing import Any, BinaryIO
 
@@ -86,8 +87,6 @@ class _Server:
     ) -> None:
         self.name, self.stepper, self.follower = name, stepper, follower
         self.flow, self.timer = flow, timer
-        # Successive requests mostly have the same scene: it is cached.
-        self.kept: tuple[bytes, Scene] | None = None
 
     def run(self, lines: BinaryIO, out: BinaryIO) -> None:
         for line in lines:
@@ -123,7 +122,7 @@ class _Server:
 
     def answer(self, command: StepRequest | TrajectoryRequest | FlowRequest | TimeRequest) -> dict[str, Any]:
         try:
-            scene = self.read_scene(bytes(command.scene))
+            scene = _read_scene(bytes(command.scene))
             if isinstance(command, StepRequest):
                 return _plain(self.stepper(scene, command.state, command.t_end))
             if isinstance(command, FlowRequest):
@@ -134,14 +133,12 @@ class _Server:
                 return self.answer_time(scene, command)
             steps = self.follower(scene, command.state, command.collisions, command.t_end)
             return {"steps": steps}
-        except BadInput as error:
-            return _plain(Rejected(str(error)))
+        except (BadInput, *UNREADABLE) as error:
+            return _plain(_refusal(error))
         except OwnFailure as failure:
             return {"error": str(failure)}
         except (MemoryError, EOFError, OSError) as error:
             return {"error": f"{type(error).__name__}: {error}".removesuffix(": ")}
-        except UNREADABLE as error:
-            return _plain(_refusal(error))
 
     def answer_flow(self, scene: Scene, command: FlowRequest) -> dict[str, Any]:
         if self.flow is None:
@@ -157,10 +154,10 @@ class _Server:
         ns, last = self.timer(scene, command.state, command.collisions, command.repeat)
         return {"ns": list(ns), "steps": [last]}
 
-    def read_scene(self, raw: bytes) -> Scene:
-        if self.kept is None or self.kept[0] != raw:
-            self.kept = raw, from_data(msgspec.json.decode(raw))
-        return self.kept[1]
+
+@lru_cache(maxsize=1)  # successive requests mostly have the same scene
+def _read_scene(raw: bytes) -> Scene:
+    return from_data(msgspec.json.decode(raw))
 
 
 def _refusal(error: Exception) -> Rejected:

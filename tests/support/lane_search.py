@@ -36,11 +36,13 @@ class Round(LaneRound):
 
     Attributes:
         is_disk: whether particles move unfolded through the base: in a cap, and as captured ones.
+        serves: the longest time that a piece of its laws serves.
     """
 
     def __init__(self, scene: Scene, kernels: ModuleType = lanes, *, is_captured: bool = False) -> None:
         super().__init__(scene)
         self.kernels = kernels
+        self.serves = float(np.diff(self.in_lanes.pieces.begins, append=self.in_lanes.pieces.period).max())
         self.is_disk = self.is_disk or is_captured
 
     def fill_all(self, starts: list[Start], age: float = 0.0) -> None:

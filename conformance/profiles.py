@@ -43,7 +43,7 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from scene import BadInput, Horizon, Mushroom, Outcome, Scene, State
+from scene import BadInput, Horizon, Mushroom, Scene, State
 from scene.geometry import area, half_width, table_at
 from scene.laws import size_bounds, values
 from scene.protocol.wire import Flowing
@@ -339,8 +339,7 @@ def _is_captured(scene: Mushroom, at: Horizon) -> bool:
     return at.y > 0 and spin > half_width(fp, scene, at.t) * sqrt(2 * _energy(at))
 
 
-def _energy(at: State | Outcome) -> float:
-    assert isinstance(at, State | Horizon)
+def _energy(at: State | Horizon) -> float:
     # For a nonsensical answer it may be infinite; `**` would raise instead.
     return (at.vx * at.vx + at.vy * at.vy) / 2
 

@@ -19,6 +19,7 @@ import io
 import itertools
 import math
 import re
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -288,14 +289,11 @@ def write_tables(sheet: Sheet, folder: Path) -> int:
 
     Questions about what is no scene or no state, which are to be refused, are left out.
     """
-    by_scene: dict[str, list[SheetQuestion]] = {}
+    by_scene = defaultdict[str, list[SheetQuestion]](list)
     for question in sheet.questions.values():
-        if question.case == REJECTS:  # a state without vy
-            continue
-        try:
-            by_scene.setdefault("".join(_scene_lines(question.request["scene"])), []).append(question)
-        except (TypeError, AttributeError, ValueError):
-            continue
+        with suppress(TypeError, AttributeError, ValueError):  # no scene
+            if question.case != REJECTS:  # a state without vy
+                by_scene["".join(_scene_lines(question.request["scene"]))].append(question)
     names = {f"{number:05d}.csv": scene for number, scene in enumerate(by_scene, 1)}
     files: dict[str, Any] = {name: scene + "".join(_rows(by_scene[scene])) for name, scene in names.items()}
     write_files(folder, {**files, INDEX: "".join(f"{name}\n" for name in names), KEY: _key(sheet)})

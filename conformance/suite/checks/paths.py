@@ -40,7 +40,7 @@ from scene import (
     Undecided,
 )
 from scene.geometry import half_width, table_at
-from scene.laws import bounds
+from scene.laws import bounds, is_constant
 from scene.tables import laws
 from scene.transforms import scaled, scaled_state
 
@@ -128,6 +128,8 @@ def _first_flaw(
     )
     rounding = margin + aside * turning / pace
     off_before = np.abs(kept) / np.append(now.r if start.wall == "arc" else 1.0, steep[:-1]) / size
+    is_at_rest = all(is_constant(law) for law in laws(scene).values())
+    gained = is_at_rest * np.abs(np.hypot(vx, vy) / hypot(start.vx, start.vy) - 1.0)
     flaws = {
         "its time is not when the flight ends": np.abs(t - t0 - dt) > late / 2 + flight * np.abs(dt),
         "is off the flight before": off_flight > flight + 4 * late * speed / size,
@@ -137,6 +139,7 @@ def _first_flaw(
         "is beyond a wall, or was on the way": _beyond(scene, before, dt, walls, (x, y))
         > margin + 2 * off_before,
         "comes after nothing": dt < 0,
+        "has another speed than at the start, in a table at rest": gained > SLACK * BOUND,
     }
     bad = {why: int(np.argmax(where)) for why, where in flaws.items() if where.any()}
     if not bad:
@@ -235,7 +238,7 @@ def follow(side: Implementation, scene: Scene, state: State, n: int, t_end: floa
     for outcome in decided[:1]:
         assert isinstance(outcome, Collision | Horizon), f"{state} in {scene}: {outcome}"
     if flaw := flaw_of(scene, state, decided, side.errors):
-        number = int(flaw.split()[1]) - 1 if flaw.startswith("outcome") else len(decided) - 1
+        number = int(flaw.split()[1]) - 1
         before = decided[number - 1] if number else state
         raise AssertionError(f"{flaw}: {decided[number]}, after {before}, in {scene}")
     if side.profile == "flow" and len(decided) == len(path):

@@ -2,8 +2,8 @@
 
 Spoilt lines are refused without a traceback, by servers and the runner; spoilt scene files are in
 test_scene_load. `MUSHROOMS_LINES=20000 MUSHROOMS_RUNS=1000 pytest tests/test_conformance_protocol.py` spoils
-20,000 lines for each of the three servers and the runner, and answers 1000 runs with nonsense; it takes some
-thirty minutes.
+20,000 lines for the runner and for each of two servers (the third is deep), and answers 1000 runs with
+nonsense; it takes some thirty minutes.
 
 The checks: honest servers hold them, and each faulty server is refused by its own.
 """

@@ -71,14 +71,12 @@ def test_questions_in_files_hang_on_no_answer(name, sheet, tmp_path, monkeypatch
 
 def answered(lines: bytes, step=plain.next_collision) -> bytes:
     """Answer a file of questions as a program does that reads standard input."""
-
-    def follow(scene, state, n, t_end):
-        return plain.trajectory(scene, state, n, t_end, step)
-
-    def carry(scene, states, t_end):
-        return plain.flow(scene, states, t_end, step)
-
-    return answers_to(lines.splitlines(keepends=True), step, follow, flow=carry)
+    return answers_to(
+        lines.splitlines(keepends=True),
+        step,
+        lambda *asked: plain.trajectory(*asked, step),
+        flow=lambda *asked: plain.flow(*asked, step),
+    )
 
 
 def off_by(part):

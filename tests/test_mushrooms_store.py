@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import xarray
 import zarr
-from support.depth import deep_but
+from support.depth import deep_among, deep_but
 from support.harm import full_disk, harmed, held
 from support.refusals import assert_refused
 from zarr.storage import LocalStore
@@ -130,7 +130,7 @@ GOES_ON = {
 }
 
 
-@pytest.mark.parametrize("name", GOES_ON)
+@pytest.mark.parametrize("name", deep_among(GOES_ON, "long enough, then lengthened and widened"))
 def test_a_run_goes_on_with_what_it_lacks(command_line, tmp_path, followed, break_off, name):
     for n, cycles, n_kept, wanted in GOES_ON[name]:
         followed.clear()

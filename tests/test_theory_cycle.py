@@ -27,8 +27,6 @@ from theory import (
     cumulants,
     energies,
     largest_gain,
-    mean_of,
-    moments,
     predict,
     reversed_cycle,
 )
@@ -300,14 +298,6 @@ def test_mean_exp_minus_s_is_one_to_40_digits_with_recapture() -> None:
     found = captures(Cycle.of(TWICE, 40), 46)
     with found.binary.working():
         assert abs(found.taylor(-1, 0)[0] - 1) < found.binary.mpf(10) ** -40
-
-
-def test_means_over_points_and_power_series_are_two_ways_to_one_number() -> None:
-    # Convolved Chebyshev points against products of generating functions.
-    third = moments(TWICE, 3, digits=6)[3]
-    assert abs(mean_of(TWICE, lambda s: s**3, digits=6) / third - 1) < 1e-6
-    tilted = mean_of(TWICE, lambda s: s.context.exp(2 * s), digits=6)
-    assert abs(tilted.context.log(tilted) / cumulants(TWICE, 0, digits=6, q=2.0)[0] - 1) < 1e-6
 
 
 def test_a_reversed_cycle_with_recapture_is_the_forward_one_weighted_by_exp_minus_s() -> None:

@@ -282,7 +282,7 @@ def test_capture_rate_is_eq_dps() -> None:
     assert float(again) == pytest.approx(float(first), rel=1e-8)
 
 
-@pytest.mark.parametrize("n_cycles", [10, 30])
+@pytest.mark.parametrize("n_cycles", deep_but([10, 30], 10))
 def test_many_cycles_keep_mass_mean_spread_and_mean_exp_minus(
     n_cycles: int, solved: tuple[Energies, Energies], figures: tuple[Prediction, Prediction]
 ) -> None:

@@ -219,11 +219,10 @@ def test_the_rates_integrate_to_the_energies_of_the_cycle() -> None:
     nowhere = ctx.quad(chaotic, [0, ctx.pi, 2 * ctx.pi], maxdegree=5)
     assert abs(nowhere - predict(load("moving-cap")).log_e_nc) < 1e-9
     captured = capture_curve(load("moving-cap"), 9)
-    for k in (2, 6):
-        t_in, t_out = ctx.mpf(captured.t_in[k]), ctx.mpf(captured.t_out[k])
-        free = ctx.quad(chaotic, [0, t_in], maxdegree=4) + ctx.quad(chaotic, [t_out, 2 * ctx.pi], maxdegree=4)
-        held = ctx.quad(island, [t_in, t_out], maxdegree=5)
-        assert float(free + held) == pytest.approx(captured.s[k], abs=1e-8)
+    t_in, t_out = ctx.mpf(captured.t_in[4]), ctx.mpf(captured.t_out[4])
+    free = ctx.quad(chaotic, [0, t_in], maxdegree=4) + ctx.quad(chaotic, [t_out, 2 * ctx.pi], maxdegree=4)
+    held = ctx.quad(island, [t_in, t_out], maxdegree=5)
+    assert float(free + held) == pytest.approx(captured.s[4], abs=1e-8)
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-anticlockwise", "frozen-mushroom"])

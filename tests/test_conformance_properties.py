@@ -363,7 +363,7 @@ def test_some_waves_add_up_to_more_than_the_mean(tally):
     assert tally["deep"] > 5
 
 
-N_SESSIONS, N_EACH = 20, 30
+N_SESSIONS, N_EACH = 30, 30
 N_DRAWN = N_SESSIONS * N_EACH
 
 

@@ -1,4 +1,4 @@
-"""The verifier: its arithmetic against exact numbers, Arb and mpmath; forged and sampled claims; files.
+"""The verifier: its arithmetic against exact numbers, Arb and mpmath; forged claims; files.
 
 Its requirements are needed: without one of these it proves a claim that it refuses. A requirement is a piece
 of `conformance/verify.py`, and what stands there without it. The weaker verifier answers a question; that
@@ -11,7 +11,6 @@ import operator
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -21,14 +20,13 @@ from typing import Any
 
 import flint
 import pytest
-from support.falsifier import Line, falsify, numbers
 from support.forged_claims import CORPUS, KINDS, REFUSALS, draw, judge, lines, plain, pool
-from support.truth import IS_DEEP
 
 from conformance import verify
 from conformance.vectors import certified
 from scene import from_data
 from scene.laws import value
+from scene.precision import decimals
 from scene.tables import laws
 
 N_CASES = int(os.environ.get("MUSHROOMS_INTERVALS", 1_500))
@@ -85,16 +83,19 @@ def check_circle(random: Random, bits: int) -> None:
 def check_law(random: Random, bits: int) -> None:
     """A law and its derivatives over a stretch: mpmath's lie within, for points of the stretch."""
     line = random.choice(pool("answered"))
-    scene, t, mp = verify.read_scene(line["scene"], [verify.WORK]), Fraction(line["state"]["t"]), numbers()
+    scene, t, mp = (
+        verify.read_scene(line["scene"], [verify.WORK]),
+        Fraction(line["state"]["t"]),
+        decimals(DECIMALS),
+    )
     name, law = random.choice(list(laws(from_data(line["scene"])).items()))
     begin = Fraction(random.getrandbits(40), 2**36)
     length = Fraction(random.getrandbits(20), 2 ** random.randint(16, 200)) * random.randint(0, 1)
     stretch = verify.join(verify.number(begin, bits), verify.number(begin + length, bits))
     jet = verify.law_jet(scene.laws[name], verify.Clock(scene, t, bits), stretch)
     point = t + begin + length * random.choice((0, 1, Fraction(1, 4)))
-    with mp.workdps(DECIMALS):
-        at = mp.mpf(point.numerator) / point.denominator
-        ratios = [value(mp, law, at, order).as_integer_ratio() for order in (0, 1, 2)]
+    at = mp.mpf(point.numerator) / point.denominator
+    ratios = [value(mp, law, at, order).as_integer_ratio() for order in (0, 1, 2)]
     for interval, ratio in zip(jet, ratios, strict=True):
         (low, high), number = interval.ends, Fraction(*map(int, ratio))
         around = (1 + abs(number)) / Fraction(10) ** 230
@@ -132,15 +133,6 @@ def test_a_number_that_is_lost_is_seen(check, monkeypatch):
         test_arithmetic_loses_no_number(check)
 
 
-def sample() -> Iterator[Line]:
-    """Yield a line of every eighth group, the first step of a path; all lines in a deep run."""
-    lines = [line for line in pool("answered") if line["kind"] != "flow"]
-    by_group = {line["group"]: line for line in lines}
-    for line in lines if IS_DEEP else list(by_group.values())[::8]:
-        answer = line["expect"][0]
-        yield {**line, "expect": [{**answer, "steps": answer.get("steps", [])[: None if IS_DEEP else 1]}]}
-
-
 def test_no_forgery_is_accepted(tally):
     accepted = []
     for kind, line in draw(N_FORGERIES, 1):
@@ -156,18 +148,6 @@ def test_a_line_has_one_budget_of_work(monkeypatch):
     monkeypatch.setattr(verify, "WORK", 2**10)
     line = next(line for line in pool("answered") if line["id"] == "longest-flow/1")
     assert verify.verify_line(line) == verify.Verdict("not proved", "the search takes too long")
-
-
-def test_no_claim_of_the_corpus_is_falsified_by_sampling():
-    assert [(line["id"], wrong) for line in sample() if (wrong := falsify(line, 100))] == []
-
-
-def test_a_hit_that_a_claim_misses_is_falsified_by_sampling():
-    random, (pool_of, forge_of) = Random(1), KINDS["a hit missed"]
-    lines = random.sample(pool(pool_of), 8)
-    forged = [line for line in (forge_of(random, line) for line in lines) if line]
-    assert len(forged) > 4
-    assert all(falsify(line, 100) for line in forged)
 
 
 CAP: dict[str, Any] = {"table": "cap", "r": 1.0}

@@ -1,7 +1,5 @@
 """`mushrooms audit --ensemble`: a right ensemble passes, wrong ones are refuted with the likely cause."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures: orbits and their exports, the command, ensembles, what heats fastest, typeset formulas."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import math

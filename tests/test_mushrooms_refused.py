@@ -1,7 +1,5 @@
 """Bad input to any command: one line that says what must hold, exit code 2, and nothing written."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from pathlib import Path

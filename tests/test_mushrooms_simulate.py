@@ -1,7 +1,5 @@
 """`simulate`: time, theory beside results, folders that are held; clusters, exports and other programs."""
 
-from __future__ import annotations
-
 import errno
 import gc
 import importlib.util

@@ -1,7 +1,5 @@
 """Stored runs: the same bits whatever the blocks, cycles and accidents, and what is refused in one line."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import hashlib

@@ -5,8 +5,6 @@ that this seed numbers. So a quick audit follows the first particles of a full o
 same bits whether it is followed at once, in parts or on another machine.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal, NamedTuple

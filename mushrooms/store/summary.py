@@ -1,7 +1,5 @@
 """What the summary of a run says: counts, the mean of log E / E0, collisions to expect, and theory."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple

@@ -273,13 +273,6 @@ def asked_of(name, number):
     return certified_draw(FAMILIES[name], "tests", number)
 
 
-def questions_of(name):
-    """Return questions of a row, or of a run by its seed and their number."""
-    return (
-        [asked_of(name, number) for number in (1, 2, 3)] if isinstance(name, str) else asked_in_a_run(*name)
-    )
-
-
 RIGHT = (
     (fast.next_collision, follow, carry),
     (plain.next_collision, plain.trajectory, plain.flow),
@@ -289,7 +282,9 @@ USUAL = (1, SOME), "returning-stem-left", "thin-ring"
 
 @pytest.mark.parametrize("name", deep_but([(1, SOME), (1, ROUND), (2, ROUND), *DEALT], *USUAL))
 def test_right_steppers_pass(name):
-    for vector in questions_of(name):
+    """To questions of a row, or of a run by its seed and their number."""
+    is_row = isinstance(name, str)
+    for vector in [asked_of(name, number) for number in (1, 2, 3)] if is_row else asked_in_a_run(*name):
         for steppers in RIGHT:
             found = grade(vector, vectors.answer(vector, *steppers))
             assert found.verdict == "pass", (vector, found)

@@ -120,10 +120,6 @@ CTX = MPContext()
 CTX.dps = 60
 
 
-def as_real(number: Fraction) -> object:
-    return CTX.mpf(number.numerator) / CTX.mpf(number.denominator)
-
-
 def after_a_spike(random: np.random.Generator) -> Question:
     """Ask for a horizon just after a wall has come and gone, in a billionth of the time or less."""
     width = 2.0 ** -float(random.integers(30, 45))
@@ -150,7 +146,7 @@ def beside_a_moving_mouth(random: np.random.Generator) -> Question:
         float(random.uniform(-0.2, 0.2)),
     )
     vx, vy = along / s, -y / s
-    crossing = as_real(Fraction(y) / Fraction(-vy))
+    crossing = CTX.mpf(y) / CTX.mpf(-vy)
     edge = value(CTX, w, t + crossing) * (1 + random.choice([-1, 1]) * CTX.mpf(2) ** random.uniform(-56, -40))
     x = float(random.choice([-1, 1]) * edge - CTX.mpf(vx) * crossing)
     return Mushroom(r=1.5, h=1.0, w=w), State(t, x, y, vx, vy), t + 1.01 * s

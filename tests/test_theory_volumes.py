@@ -162,15 +162,14 @@ def drifts(t: float, speed: float, of: Callable[..., float]) -> float:
     return largest
 
 
-def size_of_sin_phi_hat(x: float, y: float, vx: float, vy: float, r: float) -> float:
-    return abs(float(sin_phi_hat(fp, x, y, vx, vy, r)))
-
-
-def log_cap_invariant(x: float, y: float, vx: float, vy: float, r: float) -> float:
-    return math.log(cap_invariant(fp, vx, vy, r))
-
-
-@pytest.mark.parametrize("of", [size_of_sin_phi_hat, log_cap_invariant])
+@pytest.mark.parametrize(
+    "of",
+    [
+        lambda x, y, vx, vy, r: abs(float(sin_phi_hat(fp, x, y, vx, vy, r))),
+        lambda x, y, vx, vy, r: math.log(cap_invariant(fp, vx, vy, r)),
+    ],
+    ids=["sin phi hat", "invariant"],
+)
 def test_what_the_cap_keeps_drifts_as_one_over_v(of: Callable[..., float]) -> None:
     for t in (2.3, 2 * math.pi):
         slow, quick = (speed * drifts(t, speed, of) for speed in (40.0, 4000.0))

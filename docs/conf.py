@@ -124,11 +124,11 @@ def no_alias(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any)
 
 def draw_gallery(app: Any) -> None:
     """Make the pictures of the pages; those that are there are kept until docs/generated/ is deleted."""
-    from mushrooms import gallery
+    from docs import pictures
 
     for page in DOCS.glob("*.md"):
-        if not all((DOCS / "generated" / name).exists() for name, _ in gallery.blocks(page)):
-            gallery.draw(page, DOCS / "generated")
+        if not all((DOCS / "generated" / name).exists() for name, _ in pictures.blocks(page)):
+            pictures.draw(page, DOCS / "generated")
 
 
 def write_commands(_: Any) -> None:

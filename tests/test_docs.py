@@ -33,9 +33,9 @@ from conformance.suite.checks.flows import MAX_STATES
 from conformance.suite.checks.paths import MAX_HITS, MAX_WAIT
 from conformance.suite.checks.requests import MOST_SAMPLES
 from conformance.suite.session import read_answer
+from docs import pictures
 from fast.kernel.follow import LANE_ROWS
 from fast.validation import MAX_CYCLES, MOST_IN_CYCLES, MOST_TO_A_TIME
-from mushrooms import gallery
 from mushrooms.commands import MOST_ON_DISK
 from mushrooms.orbits import MAX_COLLISIONS, MAX_ORBITS
 from mushrooms.simulate import MOST_IN_MEMORY
@@ -410,8 +410,8 @@ def test_the_pictures_of_the_pages_are_made(tmp_path):
     """All of them, by the code that stands above each; a page shows every picture that it makes."""
     for page in DOCS.glob("*.md"):
         shown = re.findall(r"\]\(generated/([^)]+)\)", page.read_text("utf-8"))
-        gallery.draw(page, tmp_path)
-        made = [name for name, _ in gallery.blocks(page)]
+        pictures.draw(page, tmp_path)
+        made = [name for name, _ in pictures.blocks(page)]
         assert sorted(made) == sorted(shown)
         for name in made:
             start = {".svg": b"<?xml", ".png": b"\x89PNG", ".gif": b"GIF89a"}[Path(name).suffix]
@@ -422,7 +422,7 @@ def test_a_block_that_fails_is_not_passed_over(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("```python a.svg\nfigure = nothing\n```\n")
     with pytest.raises(NameError):
-        gallery.draw(page, tmp_path / "pictures")
+        pictures.draw(page, tmp_path / "pictures")
 
 
 def is_run(name: str, first: str, text: str) -> bool:

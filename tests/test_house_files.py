@@ -29,7 +29,7 @@ MAX_STATEMENTS = {
     "conformance": 8_602,
     "mushrooms": 3_520,
     "tests": 11_285,
-    "docs": 110,
+    "docs": 134,
     ".ci": 40,
 }
 MAX_ARGUMENTS = 8  # of a kernel: what belongs together is a record

@@ -11,8 +11,7 @@ import json
 from functools import cache
 
 import msgspec
-from hypothesis import assume, currently_in_test_context, note
-from hypothesis import strategies as st
+from hypothesis import assume, currently_in_test_context, note, strategies as st
 
 from conformance import plain
 from conformance.cases import scenes as scene_draws

@@ -129,11 +129,6 @@ def as_arrays(starts: Sequence[Particle]) -> tuple[FloatArray, IntArray]:
     return rows, np.array([start.wall for start in starts], dtype=np.int64)
 
 
-TOO_LATE = (
-    "too late: at the highest harmonic a phase exceeds 2^27 quarter turns, which binary64 cannot resolve"
-)
-
-
 def end_of_path(
     code: int, scene: Scene, state: State, n: int, t_end: float, place: Iterable[float]
 ) -> Outcome:
@@ -148,7 +143,10 @@ def end_of_path(
         return Undecided(placed(scene, state, wall, "within rounding of"))
     since = f"{n} collisions after state.t = {state.t!r}" if n else f"state.t = {state.t!r}"
     if code == records.FAR_TIME:
-        return Undecided(f"{since}: {TOO_LATE}")
+        return Undecided(
+            f"{since}: too late: at the highest harmonic a phase exceeds 2^27 quarter turns, which binary64"
+            " cannot resolve"
+        )
     found = REASONS.get(code)
     if n and (found is None or isinstance(found, Rejected)):
         return Undecided(f"{since}: rounding puts the particle beyond a wall")

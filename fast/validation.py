@@ -22,7 +22,6 @@ MAX_PARTICLES = 10**8
 MAX_FIRST = 2**62  # number of a first particle: what is added to it stays a 64-bit integer
 MAX_CYCLES = 10**6
 MAX_KEPT = 10**9  # energies and times of capture that an ensemble keeps: eight gigabytes
-LARGEST_ENERGY = 2.0**800
 
 
 def check_end(t_end: object) -> float:
@@ -45,7 +44,7 @@ def check_states(scene: Scene, states: object) -> list[State]:
 def check_energy(energy: object) -> float:
     """Return an energy in the bounds that squares allow."""
     found = check_number("energy", energy)
-    if not 0.0 < found <= LARGEST_ENERGY:
+    if not 0.0 < found <= 2.0**800:
         raise BadInput(f"energy = {found}, must be > 0 and at most 2^800")
     return found
 

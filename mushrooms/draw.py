@@ -11,9 +11,7 @@ import fast
 from conformance.audit.runs import scene_named
 from conformance.files import write_file
 from mushrooms import orbits
-from mushrooms.figures import energies, style
-from mushrooms.figures import orbits as pictures
-from mushrooms.figures import table as tables
+from mushrooms.figures import energies, orbits as pictures, style, table as tables
 from mushrooms.output import TABLES, announce_compilation, check_file, progress_bar, refuse_unheeded
 from mushrooms.simulate import draw_energies
 from mushrooms.store.run import is_run, open_run

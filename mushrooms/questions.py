@@ -13,8 +13,7 @@ from rich.table import Column, Table
 
 import fast
 import reference
-from conformance import vectors
-from conformance import verify as verifier
+from conformance import vectors, verify as verifier
 from conformance.audit.runs import scene_named
 from conformance.cases.attacks import UnderAttack, run
 from conformance.cases.certify import judge

@@ -5,9 +5,13 @@ the starting state, and `course` follows a flight. `isolation` finds the first r
 in the arithmetic of `arithmetic`, or for ties of `rational`.
 """
 
-from reference.answers import Moment, Outcome, Trajectory
-from reference.answers import ProvedCollision as Collision
-from reference.answers import ProvedHorizon as Horizon
+from reference.answers import (
+    Moment,
+    Outcome,
+    ProvedCollision as Collision,
+    ProvedHorizon as Horizon,
+    Trajectory,
+)
 from reference.arithmetic import Enclosure
 from reference.path import next_collision, trajectory
 

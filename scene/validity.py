@@ -31,6 +31,7 @@ from scene.laws import (
     Period,
     bounds,
     evaluate,
+    exact as number,
     is_constant,
     period_of,
     piece_at,
@@ -38,7 +39,6 @@ from scene.laws import (
     value,
     values,
 )
-from scene.laws import exact as number
 from scene.precision import decimals, intervals
 from scene.refusal import InvalidScene
 

@@ -14,8 +14,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, seed, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, seed, settings, strategies as st
 from msgspec.structs import replace
 from support import tables
 from support.depth import deep_but
@@ -56,8 +55,7 @@ from scene import (
 from scene.geometry import rounded
 from scene.laws import bounds, is_constant, size_bounds, values
 from scene.states import check_numbers
-from scene.tables import laws as laws_of
-from scene.tables import period
+from scene.tables import laws as laws_of, period
 
 N_QUESTIONS = 40
 HONEST = {"plain": plain.next_collision, "fast": fast.next_collision}

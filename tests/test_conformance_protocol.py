@@ -39,8 +39,7 @@ from conformance.grading.agreement import grade
 from conformance.harness import kit
 from conformance.harness.examples import Example, find_examples, find_kit_examples
 from conformance.mutants import COMMON, MUTANTS, PLAIN
-from conformance.suite import checks, reports, session
-from conformance.suite import run as suite
+from conformance.suite import checks, reports, run as suite, session
 from conformance.suite.checks import flows, requests, timing
 from conformance.suite.checks.form import Draw, run_check
 from conformance.suite.process import CheckFailure

@@ -13,8 +13,7 @@ from support.refusals import assert_refused
 
 from conformance import plain, vectors
 from conformance.harness.examples import FOLDER, compiled, find_examples
-from conformance.suite import run as suite
-from conformance.suite import sheet as sheets
+from conformance.suite import run as suite, sheet as sheets
 from conformance.suite.checks import flows
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits

@@ -19,8 +19,7 @@ from support.schemas import validator
 
 from conformance import vectors
 from conformance.mutants.kill_matrix import diagnose
-from conformance.suite import reports
-from conformance.suite import run as suite
+from conformance.suite import reports, run as suite
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import VERDICTS, Result, Run
 from conformance.suite.run import Transform

@@ -13,8 +13,7 @@ from support.truth import centre, proved_step
 
 import fast
 import reference
-from conformance.grading.agreement import compare
-from conformance.grading.agreement import exact as enclosed
+from conformance.grading.agreement import compare, exact as enclosed
 from conformance.strategies import scenes_and_states
 from fast.kernel import records
 from fast.kernel.fine_step import FineState, fine_path

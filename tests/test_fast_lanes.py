@@ -10,8 +10,7 @@ from types import FunctionType
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from mpmath import MPContext
 from msgspec.structs import replace
 from numba import njit, types

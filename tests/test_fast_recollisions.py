@@ -16,9 +16,7 @@ from support.truth import proved_step
 
 import fast
 from conformance.cases.draw import Draw
-from conformance.cases.scenes import Clock, point
-from conformance.cases.scenes import scene as drawn_scene
-from conformance.cases.scenes import state as drawn_state
+from conformance.cases.scenes import Clock, point, scene as drawn_scene, state as drawn_state
 from conformance.grading.agreement import compare
 from scene import (
     BangBang,

@@ -26,8 +26,7 @@ from conformance.cases.draw import Draw
 from conformance.cases.scenes import deep_wave
 from conformance.cases.table import FAMILIES
 from conformance.grading.agreement import compare
-from fast import pieces, units
-from fast import step as stepper
+from fast import pieces, step as stepper, units
 from fast.batch import lane_steps
 from fast.kernel import arithmetic, records
 from fast.kernel.records import BAD_QUESTION

@@ -21,8 +21,7 @@ import conformance
 import scene as scenes
 from conformance import plain, vectors
 from conformance.bench import record, workloads
-from conformance.suite import pytest_suite
-from conformance.suite import run as suite
+from conformance.suite import pytest_suite, run as suite
 from conformance.suite.checks import flows
 from conformance.suite.session import Session
 from mushrooms import bench, output

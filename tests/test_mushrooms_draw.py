@@ -21,9 +21,7 @@ import reference
 import scene as scenes
 import theory
 from mushrooms import lyapunov, orbits
-from mushrooms.figures import energies, style
-from mushrooms.figures import orbits as pictures
-from mushrooms.figures import table as tables
+from mushrooms.figures import energies, orbits as pictures, style, table as tables
 from mushrooms.figures.heating import Loop, fastest, moving_cap, phase_diagram, supremum, switched
 from mushrooms.reports.page import as_json, typeset
 from scene import BangBang, Mushroom, load

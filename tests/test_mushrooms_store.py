@@ -21,13 +21,11 @@ from zarr.storage import LocalStore
 import fast
 import mushrooms
 from conformance.files import sealed, unsealed
-from fast.kernel import follow as kernel
-from fast.kernel import records
+from fast.kernel import follow as kernel, records
 from mushrooms import simulate
 from mushrooms.main import run
 from mushrooms.output import LOCK, locked
-from mushrooms.store import conduct
-from mushrooms.store import run as stored
+from mushrooms.store import conduct, run as stored
 from mushrooms.store.run import DESCRIPTION, DIGESTED, StoredRun
 from mushrooms.store.spec import LANES, SCHEMA, RunSpec, paused_of, shape_of
 from scene import load, to_data

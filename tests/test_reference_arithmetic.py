@@ -7,8 +7,7 @@ from pathlib import Path
 
 import mpmath
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 import reference
 from reference.arithmetic import Arithmetic, Enclosure, rational, sign

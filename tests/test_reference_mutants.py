@@ -12,8 +12,7 @@ from fractions import Fraction
 import mpmath
 import msgspec
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from support import faulty_references as faults
 from support.answers_by_hand import ANSWERS
 from support.depth import deep_among, deep_but

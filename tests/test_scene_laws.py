@@ -9,8 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, given, strategies as st
 from mpmath import MPContext, MPIntervalContext, fp, mpf
 from support.depth import deep_but
 from support.refusals import one_line

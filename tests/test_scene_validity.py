@@ -8,8 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, given, strategies as st
 from mpmath import MPContext, fp
 from msgspec.structs import replace
 from support.depth import deep_among
@@ -26,16 +25,15 @@ from scene import (
     catalogue,
     from_data,
     load,
+    mouth as module,
     to_data,
     validity,
 )
-from scene import mouth as module
 from scene.exact import leg_intervals
 from scene.geometry import area, rounded, table_at
 from scene.laws import bounds, breakpoints, exact, shared_period, value, values
 from scene.mouth import mouth_minima
-from scene.tables import laws as laws_of
-from scene.tables import period
+from scene.tables import laws as laws_of, period
 from scene.validity import sign_on_legs
 
 UP = math.nextafter(1.0, 2.0)

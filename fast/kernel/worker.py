@@ -20,8 +20,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numba import config, typeof, types
-from numba.core.typing import Signature
-from numba.core.typing import signature as returns
+from numba.core.typing import Signature, signature as returns
 
 from fast.kernel.compiling import HOW, caller, kept, widest_registers
 from fast.kernel.lane_laws import DEGREES, NO_WAVES, ONE_WAVE, TWO_WAVES

@@ -19,8 +19,7 @@ from mpmath import fp
 
 import theory
 from mushrooms import lyapunov
-from mushrooms.figures import style as plots
-from mushrooms.figures import table as tables
+from mushrooms.figures import style as plots, table as tables
 from mushrooms.orbits import BoolArray, FollowedOrbit, boundary, boundary_map, span_of_nu
 from scene import Mushroom, Scene, Stem
 from scene.geometry import table_at

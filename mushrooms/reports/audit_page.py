@@ -20,8 +20,7 @@ from conformance.audit.runs import Sample, run_seed, scene_of
 from conformance.audit.session import AuditResult
 from conformance.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, share, spread
 from mushrooms import __version__
-from mushrooms.figures import by_claim
-from mushrooms.figures import style as plots
+from mushrooms.figures import by_claim, style as plots
 from mushrooms.reports.page import embed, pull, render
 
 PAPER = "https://arxiv.org/abs/1305.2624"

@@ -18,8 +18,7 @@ from conformance import vectors
 from conformance.grading.agreement import FAIR, SHARP, middle
 from conformance.suite import Result, Run, reports
 from conformance.suite.session import outcomes_of
-from mushrooms.figures import style as plots
-from mushrooms.figures import table as draw
+from mushrooms.figures import style as plots, table as draw
 from mushrooms.reports.page import embed, render
 from scene import BadInput, Collision, Horizon, Outcome, Scene, State, from_data
 

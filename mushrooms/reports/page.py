@@ -76,7 +76,9 @@ def typeset(text: str) -> Markup:
     found = str(escape(text))
     for plain, sign in SIGNS.items():
         found = found.replace(str(escape(plain)), sign)
-    found = _POWER.sub(lambda power: f"<sup>{_minus(power['long'] or power['short'])}</sup>", found)
+    found = _POWER.sub(
+        lambda power: f"<sup>{(power['long'] or power['short']).replace('-', '−')}</sup>", found
+    )
     return Markup(_SYMBOL.sub(_symbol, found))  # escaped above: only our own tags are added
 
 
@@ -85,7 +87,3 @@ def _symbol(match: re.Match[str]) -> str:
         return f"<i>{GREEK[match['greek']]}</i>"
     base, index = GREEK.get(match["base"], match["base"]), match["index"] or match["digit"]
     return f"<i>{base}</i><sub>{index}</sub>"
-
-
-def _minus(exponent: str) -> str:
-    return exponent.replace("-", "−")

@@ -10,8 +10,7 @@ from mpmath import fp
 
 from conformance.suite.process import CheckFailure
 from scene import Mushroom, from_data
-from scene.geometry import TableAt
-from scene.geometry import rounded as table_of
+from scene.geometry import TableAt, rounded as table_of
 from scene.laws import Law, bounds, value
 from support.faulty_steppers import (
     FLOW,

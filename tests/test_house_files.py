@@ -22,14 +22,14 @@ LONGER = {"conformance/verify.py": "one file that anyone can read and run, witho
 # Statements of a folder's Python files (nodes of `ast.stmt`), without docstrings: a bound rises for a new
 # capability only.
 MAX_STATEMENTS = {
-    "scene": 1_391,
-    "reference": 1_355,
-    "fast": 3_392,
-    "theory": 2_144,
-    "conformance": 8_602,
-    "mushrooms": 3_520,
-    "tests": 11_285,
-    "docs": 134,
+    "scene": 1_372,
+    "reference": 1_307,
+    "fast": 3_335,
+    "theory": 2_085,
+    "conformance": 8_465,
+    "mushrooms": 3_435,
+    "tests": 10_974,
+    "docs": 129,
     ".ci": 40,
 }
 MAX_ARGUMENTS = 8  # of a kernel: what belongs together is a record

@@ -46,11 +46,12 @@ def _call(given: list[str]) -> NoReturn:
     try:
         _end_as_by_keyboard()
         _refuse_empty(given)
-        with typer.main.get_command(app).make_context(PROGRAM, list(given)) as context:
-            code = context.command.invoke(context)
+        try:
+            with typer.main.get_command(app).make_context(PROGRAM, list(given)) as context:
+                code = context.command.invoke(context)
+        except typer.Exit as stop:  # of --help and --version, too
+            code = stop.exit_code
         sys.stdout.flush()
-    except typer.Exit as stop:
-        code = stop.exit_code
     except KeyboardInterrupt as error:
         code = _tell(INTERRUPTED, "interrupted", error)
     except BrokenPipeError:

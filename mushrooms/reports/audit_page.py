@@ -256,7 +256,12 @@ def to_text(data: Data) -> str:
         lines.append(f"{mark} {finding['id']:<4}{finding['verdict']:<28}{n_held:>3}/{n:<4}{finding['where']}")
         if not finding["as_expected"]:
             lines.append(f"      expected: {finding['expected']}")
-            lines += [f"      {line}" for line in _failed(finding)]
+            # Each check that does not come out as its form asks: what is printed must fail.
+            lines += [
+                f"      {check['form']}: {check['what']}: {figures_text(check)}, expected {check['expected']}"
+                for check in finding["checks"]
+                if (check["holds"] is not True) != (check["form"] == "printed")
+            ]
     n_right = sum(finding["as_expected"] for finding in data["findings"])
     alarms = data["false_alarms"]
     lines += [
@@ -266,12 +271,3 @@ def to_text(data: Data) -> str:
         f" a false alarm in fewer than {alarms['bound']:.1e} of audits.",
     ]
     return "\n".join(lines) + "\n"
-
-
-def _failed(finding: Data) -> list[str]:
-    """Return a line for each check that does not come out as its form asks: what is printed must fail."""
-    return [
-        f"{check['form']}: {check['what']}: {figures_text(check)}, expected {check['expected']}"
-        for check in finding["checks"]
-        if (check["holds"] is not True) != (check["form"] == "printed")
-    ]

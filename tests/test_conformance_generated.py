@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable
 from functools import cache
 from itertools import count
-from math import hypot
+from math import cos, hypot, sin
 from types import SimpleNamespace
 from typing import Any
 
@@ -41,11 +41,12 @@ from conformance.mutants.mutant import make_mutant
 from conformance.mutants.walls import UPRIGHT, TieBlind
 from conformance.plain.step import MAX_COLLISIONS, BangBangMotion, ConstantMotion, Flight, PlainPath
 from conformance.suite.checks import checks_of
+from conformance.suite.checks.paths import flaw_of
 from conformance.suite.run import Transform, draw_transform
 from conformance.verify import Verdict, verify_line
 from fast import paths
 from fast.__main__ import carry, follow
-from scene import BadInput, BangBang, Fourier, Horizon, Mushroom, Rejected, State, Undecided, from_data
+from scene import BadInput, BangBang, Cap, Fourier, Horizon, Mushroom, Rejected, State, Undecided, from_data
 from scene.laws import MAX_KNOTS
 from scene.tables import laws
 
@@ -366,6 +367,20 @@ def test_a_stepper_right_in_the_corpus_alone_is_right_in_steps(name):
 @pytest.mark.parametrize("name", FAULTS)
 def test_one_of_three_runs_finds_each_out(name):
     assert any(fails(FAULTS[name][0], asked_in_a_run(seed)) for seed in (1, 2, 3))
+
+
+@pytest.mark.parametrize(("turn", "grow"), [(0.0, 1.0), (3e-8, 1.0), (0.0, 1.0 + 3e-8)])
+def test_what_a_cap_at_rest_keeps_may_not_drift_along_a_path(turn, grow):
+    """Each bounce alone is within what a coarse stepper may be off."""
+    scene, start = Cap(r=1.0), State(0.0, 0.1, 0.2, 3.0, 4.0)
+    now, path = start, []
+    for _ in range(300):
+        hit = plain.next_collision(scene, now, 1e300)
+        v = complex(hit.vx, hit.vy) * grow * complex(cos(turn), sin(turn))
+        path.append(msgspec.structs.replace(hit, vx=v.real, vy=v.imag))
+        now = path[-1].state()
+    flaw = flaw_of(scene, start, path, {name: [1e-3] * 100 for name in ("place", "bounce", "flight")})
+    assert ("at rest" in flaw) == (turn != 0.0 or grow != 1.0)
 
 
 def test_a_particle_that_is_lost_after_its_capture_has_no_interval(monkeypatch):

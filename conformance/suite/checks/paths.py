@@ -130,6 +130,7 @@ def _first_flaw(
     off_before = np.abs(kept) / np.append(now.r if start.wall == "arc" else 1.0, steep[:-1]) / size
     is_at_rest = all(is_constant(law) for law in laws(scene).values())
     gained = is_at_rest * np.abs(np.hypot(vx, vy) / hypot(start.vx, start.vy) - 1.0)
+    spin = np.abs(np.abs(x * vy - y * vx) - abs(start.x * start.vy - start.y * start.vx))
     flaws = {
         "its time is not when the flight ends": np.abs(t - t0 - dt) > late / 2 + flight * np.abs(dt),
         "is off the flight before": off_flight > flight + 4 * late * speed / size,
@@ -140,6 +141,9 @@ def _first_flaw(
         > margin + 2 * off_before,
         "comes after nothing": dt < 0,
         "has another speed than at the start, in a table at rest": gained > SLACK * BOUND,
+        "has another |x vy - y vx| than at the start, in a cap at rest": is_at_rest
+        * isinstance(scene, Cap)
+        * (spin > SLACK * BOUND * size * hypot(start.vx, start.vy)),
     }
     bad = {why: int(np.argmax(where)) for why, where in flaws.items() if where.any()}
     if not bad:

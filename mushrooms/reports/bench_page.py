@@ -125,6 +125,7 @@ MARKS = {
     "time-stepping": "v",
     "fixed-step": "^",
     "lean": "P",
+    "example": "h",
     "command": "*",
 }
 # What the steppers are called in one panel for a first look.

@@ -161,8 +161,10 @@ def test_the_figures_of_the_corpus_are_right():
 
 @pytest.mark.parametrize("name", MODULES)
 def test_a_published_schema_is_what_its_module_makes(name):
+    """But for the indents of docstrings, which Python 3.13 leaves out."""
     made = importlib.import_module(MODULES[name]).json_schema()
-    assert validator(name).schema == json.loads(json.dumps(made))
+    kept, again = (re.sub(r"\\n +", r"\\n", json.dumps(one)) for one in (validator(name).schema, made))
+    assert json.loads(kept) == json.loads(again)
     validator(name).check_schema(made)
 
 

@@ -304,7 +304,7 @@ def captured(scene: Scene, states: FloatArray, walls: Sequence[str]) -> npt.NDAr
     return found
 
 
-FEW = 1_000  # collisions: these take less time than to start a thread, and no interrupt waits long for them
+FEW = 100  # collisions: these take less time than to start a thread, and an interrupt can wait for them
 
 
 class Flow(NamedTuple):
@@ -371,7 +371,9 @@ def carry(
         stop = only_stop(units.horizon(t_end))
         fastest, longest = np.hypot(rows[:, 4], rows[:, 5]).max(), stop.times[0] - rows[:, 0].min()
         in_lanes = laws_in_lanes(fit(scene).scene)
-        if len(rows) * least_collisions(fit(scene).scene, fastest, longest) < FEW:
+        if len(rows) * least_collisions(fit(scene).scene, fastest, longest) < FEW and all(
+            len(trajectory(scene, states[i], FEW, t_end).walls) < FEW for i in those
+        ):  # as a path each is short: the bound alone is no argument, for a particle may skip along the arc
             follow_particles(new_worker(in_lanes, stop, done), walls)
         else:
             seconds += follow_many(in_lanes, done, walls, stop, threads)

@@ -165,3 +165,10 @@ def test_a_long_path_is_followed_elsewhere_but_compiled_here(length, is_here):
     follow_path(kernel, (1.0,), length, np.zeros(1, np.int64))
     assert (kernel.followed_by == here) == is_here
     assert kernel.compiled_by == (None if is_here else here)
+
+
+def test_a_flow_along_the_arc_can_be_interrupted_though_few_flights_fit_into_its_time(monkeypatch):
+    """It is followed in threads, which are waited for: not by what the caller's own thread calls."""
+    monkeypatch.setattr(paths, "follow_particles", None)
+    skipping = State(0.0, 0.0, 1.0, 1.0, -1e-4, "arc")
+    assert fast.flow(Cap(r=1.0), [skipping], 0.5).wall_counts.sum() > 1000

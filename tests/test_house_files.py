@@ -1,6 +1,7 @@
 """Habits of the house that a newcomer would otherwise have to be told: paths, sizes, names, docstrings."""
 
 import ast
+import math
 import re
 import shutil
 import subprocess
@@ -19,18 +20,19 @@ LANGUAGES = (".py", ".c", ".h", ".cpp", ".hpp", ".js", ".css")
 MAX_FUNCTION = 60  # lines of a function, its decorators and docstring included
 # Files, and functions by `file: name`, that may be longer, and why.
 LONGER = {"conformance/verify.py": "one file that anyone can read and run, without installing anything"}
-# Statements of a folder's Python files (nodes of `ast.stmt`), without docstrings: a bound rises for a new
-# capability only.
+# Statements of a folder's Python files (nodes of `ast.stmt`), without docstrings: 3 % above what stood at the
+# last raise, so that a mend never waits for a bound. A bound rises in the commit that adds a capability, and
+# that commit says why. Tests have none: a regression test never has to buy its place.
 MAX_STATEMENTS = {
-    "scene": 1_372,
-    "reference": 1_307,
-    "fast": 3_335,
-    "theory": 2_085,
-    "conformance": 8_466,
-    "mushrooms": 3_434,
-    "tests": 10_988,
-    "docs": 129,
-    ".ci": 40,
+    "scene": 1_413,
+    "reference": 1_346,
+    "fast": 3_435,
+    "theory": 2_147,
+    "conformance": 8_719,
+    "mushrooms": 3_537,
+    "docs": 132,
+    ".ci": 41,
+    "tests": math.inf,
 }
 MAX_ARGUMENTS = 8  # of a kernel: what belongs together is a record
 # Python hands these a state number by number; a record would take longer than the step.

@@ -159,8 +159,9 @@ inline State read_state(const json::Value& data, const Scene& scene) {
 
 // Judging ----------------------------------------------------------------------------------------------
 
-inline void judge(const Scene& scene, const State& q) {
-    if (q.wall == NO_WALL && q.y == 0 && q.vy == 0) throw Undecided("it flies along the mouth");
+inline void judge(const Scene& scene, const State& q, double t_end) {
+    bool has_arrived = t_end == q.t;
+    if (q.wall == NO_WALL && q.y == 0 && q.vy == 0 && !has_arrived) throw Undecided("it flies along the mouth");
     bool in_cap = scene.is_in_cap(q);
     double size = scene.size() + std::abs(q.t) * (scene.r.slope + scene.h.slope + scene.w.slope);
     if (q.y == 0 && q.wall != NO_WALL && q.wall != BASE) throw Undecided("the state is in a corner");
@@ -183,6 +184,7 @@ inline void judge(const Scene& scene, const State& q) {
     if (scene.nu) turns += scene.nu->curvature * scene.r.high;
     if (q.wall == BASE) turns = 0;
     if (rate < -ROUNDING * std::abs(q.t) * turns) throw Refused("the state is on a wall and moves into it");
+    if (q.wall == BASE && rate == 0 && has_arrived) return;  // it slides, and need not fly on
     if (rate <= 0) throw Undecided("the state rests on its wall, or does within rounding of its phase");
 }
 
@@ -217,8 +219,8 @@ const std::string HORIZON = "\"outcome\":\"horizon\",";
 inline std::string step(const Engine& engine, const Scene& scene, State& q, double t_end, bool& goes_on) {
     goes_on = false;
     return outcome_of([&] {
-        judge(scene, q);
-        std::optional<Hit> hit = engine(scene, q);
+        judge(scene, q, t_end);
+        std::optional<Hit> hit = t_end == q.t ? std::nullopt : engine(scene, q);
         if (!hit || hit->t >= t_end) {
             double s = t_end - q.t;
             return HORIZON + place(t_end, q.x + s * q.vx, q.y + s * q.vy, q.vx, q.vy);

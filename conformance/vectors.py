@@ -49,6 +49,7 @@ OutcomeName = Literal["collision", "horizon", "undefined", "undecided", "rejecte
 LEVELS: tuple[Level, ...] = ("core", "extended", "stress")
 NUMBERS = ("dt", "x", "y", "vx", "vy")
 MANIFEST = "manifest.json"
+VERSIONS = ("1.0", "1.1", "1.2", "1.3", "1.4")  # of the corpus, all that were published
 Follow = Callable[[Scene, State, int, float], list[Outcome]]
 Decimal = Annotated[str, msgspec.Meta(pattern=r"^-?[0-9]{1,40}(\.[0-9]{1,40})?(E[+-]?[0-9]{1,4})?$")]
 Enclosure = tuple[Decimal, Decimal]

@@ -1262,8 +1262,11 @@ def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
         Contradicted: its claim is false.
         Unproved: its claim is open.
     """
-    first, *others = take(record, "expect", list) or [None]
-    take(first, "outcome", str)
+    answers = take(record, "expect", list) or [None]
+    # What is proved is the answer that does more than refuse, if one does.
+    outcomes = [take(answer, "outcome", str) for answer in answers]
+    place = next((i for i, outcome in enumerate(outcomes) if outcome != "rejected"), 0)
+    first, others = answers[place], answers[:place] + answers[place + 1 :]
     state, steps = take(record, "state", dict), take({"steps": [], **first}, "steps", list)
     kind, count = take(record, "kind", str), record.get("collisions", 1)
     is_kind = kind in ("step", "trajectory", "flow") and type(count) is int and 0 < count < 10**6

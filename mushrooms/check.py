@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
+from conformance import vectors
 from conformance.files import write_file
 from conformance.suite import VERDICTS, Run, check, read_known, reports
 from conformance.suite.run import NEW_SEEDS, choose
@@ -80,6 +81,19 @@ def check_stepper(
         write_file(path, content(run))
     show(run)
     return run.exit_code()
+
+
+def require_corpus(version: str | None) -> None:
+    """Refuse a run with another corpus than the one asked for; None for any.
+
+    Raises:
+        BadInput: naming the version that is here, and those that exist.
+    """
+    here = vectors.manifest().corpus
+    if version is not None and version != here:
+        known = ", ".join(vectors.VERSIONS)
+        why = "is that of an earlier release" if version in vectors.VERSIONS else "does not exist"
+        raise BadInput(f"corpus = {version!r} {why}, must be {here}; there are {known}")
 
 
 def _names_of(groups: str) -> list[str]:

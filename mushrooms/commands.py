@@ -419,6 +419,9 @@ def check(
     answers: Annotated[
         Path | None, file("Grade these answers to the file of --questions.", metavar="PATH")
     ] = None,
+    corpus: Annotated[
+        str | None, typer.Option(metavar="VERSION", help="Refuse to run with another corpus than this.")
+    ] = None,
 ) -> int:
     """Test a stepper in any language. COMMAND starts it; it speaks protocol 1 on stdin and stdout.
 
@@ -427,8 +430,9 @@ def check(
 
     Exit code 0 if everything passes, 1 if something fails, 2 if the options or the suite are at fault.
     """
-    from mushrooms.check import check_stepper
+    from mushrooms.check import check_stepper, require_corpus
 
+    require_corpus(corpus)
     files = {"json": json_file, "junit": junit, "html": html, "badge": badge, "summary": summary}
     return check_stepper(
         command or [],

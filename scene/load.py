@@ -176,7 +176,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def limit_definitions(definitions: dict[str, Any]) -> None:
-    """Put into the definitions of a schema what it can say of the rules for scenes (`scene.protocol.rules`)."""
+    """Put what a schema can say of the rules for scenes (`scene.protocol.rules`) into its definitions."""
     fourier, knots = definitions["Fourier"], definitions["BangBang"]["properties"]["knots"]
     for field in ("omega", "period"):
         fourier["properties"][field] = {"type": "number", "exclusiveMinimum": 0}

@@ -26,7 +26,7 @@ CAP: Data = {"table": "cap", "r": 1.0}
 STEM: Data = {"table": "stem", "w": 1.0, "h": 1.25}
 MUSHROOM: Data = {"table": "mushroom", "r": 1.0, "w": 0.5, "h": 1.0}
 INSIDE = {"cap": (0.125, 0.25), "stem": (0.125, -0.25), "mushroom": (0.125, 0.25)}
-BRIEF = 2.0**-12  # a time in which a particle at INSIDE meets no wall
+BRIEF, LONG = 2.0**-12, 4.0  # times in which a particle at INSIDE, with speed 1, meets no wall, and meets one
 FURTHER: tuple[tuple[str, Any], ...] = (
     ("hint", 7.0),
     ("T", None),
@@ -74,8 +74,16 @@ def sample(name: str, key: object, is_kept: bool) -> Sample:
     return DRAWS[name](Draw(f"rule/{name}/{is_kept}/{key}"), is_kept)
 
 
-def _ask(draw: Draw, scene: Mapping[str, Any], state: Data | None = None, span: float = BRIEF) -> Data:
-    """Return a request for a step in a scene: from a place inside, or from a state."""
+def _ask(draw: Draw, scene: Mapping[str, Any], state: Data | None = None, span: float | None = None) -> Data:
+    """Return a request for a step in a scene: from a place inside, or from a state.
+
+    Args:
+        draw: stream of numbers.
+        scene: in the wire's form, good or bad.
+        state: likewise; None for a place inside.
+        span: the time up to the horizon; None for one in which a wall is met, or none is.
+    """
+    span = draw.pick((BRIEF, LONG)) if span is None else span
     if state is None:
         x, y = INSIDE[scene.get("table") if scene.get("table") in INSIDE else "cap"]
         vx, vy = draw.direction()
@@ -616,14 +624,13 @@ def known_request_fields(draw: Draw, is_kept: bool) -> Sample:
 
 @rule
 def fields_once(draw: Draw, is_kept: bool) -> Sample:
-    """Give t_end once, or twice with the same effect: nothing is met before either."""
+    """Give each field once, or one twice with the same value."""
     request = _ask(draw, _any_table(draw))
     if is_kept:
         return _good(request)
-    key = draw.pick(('"t_end":', '"vx":', '"table":'))
-    line = json.dumps(request, separators=(",", ":"))
-    value = {'"t_end":': "0.0001", '"vx":': "0.25", '"table":': '"cap"'}[key]
-    return Sample(request, request, line.replace(key, f"{key}{value},{key}", 1))
+    name = draw.pick(("t_end", "seq"))
+    field = f'"{name}": {json.dumps(request[name])}'
+    return Sample(request, request, json.dumps(request).replace(field, f"{field}, {field}", 1))
 
 
 # Answers
@@ -632,7 +639,7 @@ def fields_once(draw: Draw, is_kept: bool) -> Sample:
 def _answered(draw: Draw, is_kept: bool, good: str, bad: tuple[tuple[str, str], ...]) -> Sample:
     """Return a particle at rest, and an answer: the right one, or with one text replaced by another."""
     state = {"t": 0.0, "x": 0.125, "y": 0.25, "vx": 0.0, "vy": 0.0, "wall": None}
-    request = _ask(draw, CAP, state)
+    request = _ask(draw, CAP, state, BRIEF)
     own = '"outcome":"horizon","t":TEND,"x":0.125,"y":0.25,"vx":0.0,"vy":0.0'
     text = ("{" + f'"seq":{request["seq"]},' + own + good + "}").replace("TEND", repr(request["t_end"]))
     old, new = draw.pick(bad)
@@ -668,10 +675,12 @@ def finite_answers(draw: Draw, is_kept: bool) -> Sample:
 @rule
 def capture_at_the_end(draw: Draw, is_kept: bool) -> Sample:
     """Answer a flow with a capture interval beside a horizon, or beside another outcome."""
-    request = _ask(draw, MUSHROOM, {"t": 0.0, "x": 0.125, "y": 0.25, "vx": 0.0, "vy": 0.0, "wall": None})
+    request = _ask(
+        draw, MUSHROOM, {"t": 0.0, "x": 0.125, "y": 0.25, "vx": 0.0, "vy": 0.0, "wall": None}, BRIEF
+    )
     state = request.pop("state")
     request = {**request, "cmd": "flow", "states": [state]}
-    outcome = '"outcome":"horizon","t":%r,"x":0.125,"y":0.25,"vx":0.0,"vy":0.0' % request["t_end"]
+    outcome = f'"outcome":"horizon","t":{request["t_end"]!r},"x":0.125,"y":0.25,"vx":0.0,"vy":0.0'
     if not is_kept:
         lost = draw.pick(("undefined", "undecided", "rejected"))
         outcome = f'"outcome":"{lost}","reason":"{"corner" if lost == "undefined" else "a reason"}"'

@@ -36,7 +36,8 @@ from conformance.suite.process import NOT_NUMBERS, CheckFailure
 from conformance.suite.result import BAD, Result, Run, Speed, graded_parts
 from conformance.suite.session import AnswerLine, Limits, Session, missing, outcomes_of
 from conformance.vectors import NUMBERS, Vector
-from scene import BadInput, State, load, to_data, transforms
+from scene import BadInput, State, from_data, load, to_data, transforms
+from scene.protocol.rules import may_be_refused
 from scene.refusal import check_seed
 
 NEW_SEEDS = 10**6  # short enough to be typed again
@@ -154,7 +155,16 @@ def draw_transform(vector: Vector, seed: int) -> Transform:
     length, time = shared.pick(exponents), shared.pick(exponents)
     if readable(vector.scene) is None or not _stays_in_range(vector, length, time):
         return Transform(is_mirrored)
-    return Transform(is_mirrored, length, time)
+    image = Transform(is_mirrored, length, time)
+    # Lateness counts units of time where nothing moves: no question may become one that may be refused.
+    return (
+        image if _may_be_refused(image.apply(vector)) == _may_be_refused(vector) else Transform(is_mirrored)
+    )
+
+
+def _may_be_refused(vector: Vector) -> bool:
+    """Tell whether a question in a valid scene may be refused, by its own numbers."""
+    return may_be_refused(from_data(vector.scene), vector.state)
 
 
 def _stays_in_range(vector: Vector, length: int, time: int) -> bool:

@@ -1,26 +1,31 @@
 """The rules of protocol 1 in one table, and what may be answered to a question that breaks one.
 
-Each rule is a condition on a part of a question, or of an answer. A question that keeps all rules has one right
-answer, and no other passes. `otherwise` says what is answered to a question that breaks the rule.
+Each rule is a condition on a part of a question, or of an answer. A question that keeps all rules has one
+right answer, and no other passes. `otherwise` says what is answered to a question that breaks the rule.
 
-These read the table: the page docs/protocol.md (`python -m scene.protocol.rules` prints its section), the JSON
-Schema (`scene.load.limit_definitions`), `scene` (the limits stand where it checks them), the
-makers of vectors and the grading (`may_be_refused`, `does_undecided_pass`), and the draws of good and bad
-questions (`conformance.cases.rules`, one for each name). The verifier states the rules again, because it
-imports nothing of ours. tests/test_conformance_rules.py breaks each rule before each reader.
+Readers of the table are:
 
-To add a rule: a row here, a draw of the same name, the page (see above), and the check in `scene` or in the
-steppers. The tests then name the readers that do not know it.
+- the page docs/protocol.md: `python -m scene.protocol.rules` prints its section;
+- the JSON Schema: `limit_definitions` in `scene.load`, and `scene.protocol.messages`;
+- `scene`, which checks scenes, laws and numbers, and the steppers, which check states;
+- the makers of vectors and the grading: `may_be_refused`, `without_loose`, `does_undecided_pass`;
+- the draws of good and bad questions: `conformance.cases.rules`, a function for each name.
+
+The verifier states the rules again, because it imports nothing of ours. tests/test_conformance_rules.py
+breaks each rule before each reader. CONTRIBUTING says how a rule is added.
 """
 
+from collections.abc import Mapping
 from enum import Enum
 from fractions import Fraction
 from math import log2
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from scene.laws import MAX_HARMONICS, MAX_KNOTS
+import msgspec
+
+from scene.laws import MAX_HARMONICS, MAX_KNOTS, BangBang, Fourier
 from scene.states import ON_WALL, State
-from scene.tables import Scene, period
+from scene.tables import HIDDEN, Cap, Mushroom, Scene, Stem, period
 
 LATE = 2**30  # periods from time 0, or units of time if nothing moves
 LARGE = Fraction(10**100)
@@ -28,6 +33,10 @@ LARGE = Fraction(10**100)
 PI = Fraction(
     "3.141592653589793238462643383279502884197169399375105820974944592307816406286208998628034825342117068"
 )
+
+TABLES: dict[str, type[msgspec.Struct]] = {"cap": Cap, "stem": Stem, "mushroom": Mushroom}
+KINDS: dict[str, type[msgspec.Struct]] = {"fourier": Fourier, "bang-bang": BangBang}
+OPTIONAL = {"slope", "w", "nu", "omega", "period", "cos", "sin"}  # null stands for an absent one, if ignored
 
 Part = Literal["scene", "law", "state", "request", "answer"]
 
@@ -109,7 +118,8 @@ RULES = (
         "scene",
         "no optional field of a scene or a law is null",
         Duty.IGNORE,
-        "Many JSON libraries do not tell null from an absent field. Only `wall` may be null in a good question.",
+        "Many JSON libraries do not tell null from an absent field. Only `wall` may be null in a good"
+        " question.",
         in_schema=True,
     ),
     Rule("known-kind", "law", "`kind` is fourier or bang-bang", Duty.REJECT, in_schema=True),
@@ -127,8 +137,8 @@ RULES = (
         "law",
         f"`cos` and `sin` have at most {MAX_HARMONICS} numbers each",
         Duty.REJECT,
-        "The proof that a scene is valid takes time that grows steeply with the number of harmonics. A stepper"
-        " that dropped the further ones would answer for another scene.",
+        "The proof that a scene is valid takes time that grows steeply with their number. A stepper that"
+        " dropped the further ones would answer for another scene.",
         in_schema=True,
     ),
     Rule("knots", "law", f"there are 2 to {MAX_KNOTS} knots", Duty.REJECT, in_schema=True),
@@ -274,12 +284,46 @@ def is_late(scene: Scene, t: float) -> bool:
     return half_turns >= PI
 
 
+def without_loose(data: Any) -> tuple[Any, bool]:
+    """Return a scene in the wire's form without the fields that may be ignored, and whether there were any.
+
+    These are unknown fields of a scene or of its laws, optional ones that are null, and texts that may not
+    stand there. Data that are no scene are returned as they are.
+    """
+    fields = _fields_of(data, "table", TABLES)
+    if not fields:
+        return data, False
+    kept = {name: part for name, part in data.items() if name in fields}
+    for name in ("name", "notes"):
+        if name in kept and not (isinstance(kept[name], str) and HIDDEN.search(kept[name]) is None):
+            del kept[name]
+    for name in OPTIONAL & kept.keys():
+        if kept[name] is None:
+            del kept[name]
+    is_loose = len(kept) < len(data)
+    for name, law in kept.items():
+        if known := _fields_of(law, "kind", KINDS):
+            kept[name] = {
+                field: part
+                for field, part in law.items()
+                if field in known and (part is not None or field not in OPTIONAL)
+            }
+            is_loose |= len(kept[name]) < len(law)
+    return kept, is_loose
+
+
+def _fields_of(data: Any, tag: str, forms: Mapping[str, type[msgspec.Struct]]) -> tuple[str, ...]:
+    """Return the fields that an object may have by its tag; none where it is no object of any form."""
+    form = forms.get(data[tag]) if isinstance(data, Mapping) and isinstance(data.get(tag), str) else None
+    return (tag, *form.__struct_fields__) if form else ()
+
+
 def does_undecided_pass(outcomes: set[str]) -> bool:
     """Tell whether `undecided` passes for a question, by the outcomes that are listed as right.
 
-    It does where the mathematics gives no answer, and where a right answer may be refused.
+    It does where a right answer may be refused: `undecided` says as little.
     """
-    return "undefined" in outcomes or {"rejected"} < outcomes
+    return {"rejected"} < outcomes
 
 
 def page_section() -> str:

@@ -21,7 +21,7 @@ from typing import Any
 import msgspec
 
 from conformance.cases.certify import certify
-from conformance.cases.draw import Question
+from conformance.cases.draw import Question, Unfit
 from conformance.cases.table import FAMILIES
 from conformance.files import write_file
 from conformance.vectors import (
@@ -146,7 +146,10 @@ def certify_added(path: Path) -> list[Vector]:
         except (msgspec.MsgspecError, KeyError) as error:
             raise BadInput(f"{path.name}:{i}: {error}, must be a question as CONTRIBUTING has it") from None
         number = groups().get(asked.group, 0) + sum(vector.group == asked.group for vector in found) + 1
-        found.append(certify(asked, number))
+        try:
+            found.append(certify(asked, number))
+        except Unfit as why:
+            raise BadInput(f"{path.name}:{i}: no vector can be made of it: {why}") from None
     return found
 
 

@@ -49,7 +49,7 @@ ASKED = [rule for rule in RULES if rule.part != "answer"]
 ANSWERED = [rule for rule in RULES if rule.part == "answer"]
 # Of a state that steppers judge: `scene` does not know where a particle is.
 BY_PLACE = {"inside", "on-its-wall", "before-its-end", "leaves-its-wall", "one-wall", "lifts-off"}
-# What a line of the corpus cannot break: it has no command, seq or counts, and a JSON object has a field once.
+# What a line of the corpus cannot break: it has no command, no seq and no counts.
 BY_REQUEST = {
     "known-command", "whole-request", "request-types", "sequence", "counts", "known-request-fields",
     "fields-once",
@@ -259,7 +259,7 @@ def verdicts(rule: Rule, key: int, is_kept: bool, by: ModuleType = verify) -> di
 
 
 def differs_in_verifier(rule: Rule, by: ModuleType = verify, n: int = N_DRAWS) -> list[Any]:
-    """Return the lines that are not proved, or are proved with an answer more or less than the rule permits."""
+    """Return the lines that are not proved, or are proved with an answer more or less than permitted."""
     return [
         (sample(rule.name, key, is_kept), found)
         for is_kept in (True, False)
@@ -462,7 +462,7 @@ def test_a_particle_at_the_end_has_arrived_in_each_profile(name, profile):
 
 
 def test_steppers_decide_what_arrives():
-    """Along a wall that stands still, and in the mouth, no rounding hides that there is nothing to find out."""
+    """Along a wall that stands still, and in the mouth, no rounding leaves anything open."""
     for name, server in STEPPERS.items():
         told = [outcomes(server, sample("time-left", key, False).text()) for key in range(60)]
         assert told.count(["horizon"]) > 40, (name, told)

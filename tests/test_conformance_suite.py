@@ -238,6 +238,19 @@ LOST = b'{"seq":1,"states":[{"outcome":"%b","reason":"corner","captured":[1,2]}]
             "trajectory",
             "Field `reason` stands twice",
         ),
+        # A field that the protocol does not name may stand once, wherever it is, and however it is spelt.
+        *(
+            (b'{"seq":1,%b,"error":"no"}' % further, cmd, "Field `n` stands twice")
+            for cmd in BESIDE
+            for further in (
+                b'"n":1,"n":1',
+                b'"n":1,"n":2',
+                b'"n":1,"\\u006e":1',
+                b'"m":{"n":1,"n":2}',
+                b'"m":[[{"n":1,"o":0,"n":1}]]',
+            )
+        ),
+        (b'{"seq":1,"error":"no","a\\u001bb":1,"a\\u001bb":1}', "step", "stands twice"),
         *((LOST % kind, "flow", "null") for kind in (b"rejected", b"undefined", b"undecided")),
     ],
 )
@@ -256,7 +269,7 @@ REFUSAL = {"outcome": "rejected", "reason": "r"}
         *((b'{"seq":1,"error":"no",%b}' % rest, cmd, {"error": "no"}) for cmd, rest in BESIDE.items()),
         *((b'{"seq":1,"error":null,%b}' % BESIDE["step"], cmd, REFUSAL) for cmd in BESIDE),
         (b'{"seq":1,"steps":[]}', "trajectory", {"steps": ()}),
-        (b'{"seq":1,"error":"no","n":{"a":1,"a":2},"n":%b}' % (b"9" * 10**4), "step", {"error": "no"}),
+        (b'{"seq":1,"error":"no","n":{"a":1,"b":2},"m":%b}' % (b"9" * 10**4), "step", {"error": "no"}),
         (b'{"seq":1.0,"error":"no"}', "step", {"error": "no"}),
         (b'{"seq":1e0,"ns":[41e3,2.0],"steps":[]}', "time", {"ns": (41000, 2), "steps": ()}),
         (b'{"seq":1,"states":[{"outcome":"rejected","reason":"r"}]}', "flow", {"states": (REFUSAL,)}),

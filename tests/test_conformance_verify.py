@@ -477,20 +477,49 @@ LINES: dict[str, tuple[str, str, str, list[Any], Any]] = {
         "return Fraction(float(inf if abs(value) > sys.float_info.max else value ",
         "moving-cap/1", [], {"t_end": 2**1024 - 2**970 - 1, "expect": REJECTED},
     ),
-    "a schema is passed over": (
-        '{"$schema", "table"', '{"table"',
-        "moving-cap/1", [], lambda line: {"scene": {**line["scene"], "$schema": "x"}, "expect": REJECTED},
+    # Both ways: what a rule permits is listed, once.
+    "a refusal of what may be refused is listed": (
+        "others.count(permitted) == 1", "True",
+        "far-phase/1", ["expect"], lambda expect: expect[:1],
     ),
-    "a mushroom may give w as null": (
-        "and data.get(name) is None", "and False",
-        "moving-cap/1", [], lambda line: {"scene": {**line["scene"], "w": None}, "expect": REJECTED},
+    "a further answer is listed once": (
+        "others.count(permitted) == 1", "permitted in others",
+        "far-phase/1", ["expect"], lambda expect: [*expect, *REJECTED],
     ),
-    "a law may give period as null": (
-        "rates.count(None) == 1", "rates.count(None) == 1 and 'period' not in data",
+    "undecided beside undefined is listed": (
+        "others.count(permitted) == 1", "True",
+        "hard-case-06/1", ["expect"], lambda expect: expect[:1],
+    ),
+    # A field that may be ignored, or null, leaves a choice: to refuse is one answer of two.
+    "a schema leaves a choice": (
+        "if scene.is_loose or is_more or", "if is_more or",
+        "moving-cap/1", [], lambda line: {"scene": {**line["scene"], "$schema": "x"}},
+    ),
+    "a mushroom whose w is null leaves a choice": (
+        "if scene.is_loose or is_more or", "if is_more or",
+        "moving-cap/1", [], lambda line: {"scene": {**line["scene"], "w": None}},
+    ),
+    "a law whose period is null leaves a choice": (
+        "is_loose |= is_more", "pass",
         "breathing-circle/1", [],
-        lambda line: {
-            "scene": {"table": "cap", "r": {**line["scene"]["r"], "period": None}}, "expect": REJECTED,
-        },
+        lambda line: {"scene": {"table": "cap", "r": {**line["scene"]["r"], "period": None}}},
+    ),
+    "an unknown field of a state leaves a choice": (
+        "scene.is_loose or is_more or is_extreme", "scene.is_loose or is_extreme",
+        "moving-cap/1", ["state"], lambda state: {**state, "mass": 1.0},
+    ),
+    "lateness counts before time 0": (
+        "number(abs(state.t) * scene.omega", "number(state.t * scene.omega",
+        "late-start/58", ["expect"], lambda expect: expect[:1],
+    ),
+    "pi is not 22 / 7": (
+        "- pi(bits)\n", "- number(Fraction(22, 7), bits)\n",
+        "late-start/56", ["expect"], lambda expect: expect[:1],
+    ),
+    "a particle at the end has arrived": (
+        "if state.t < t_end:\n            raise", "raise",
+        "no-time-left/23", ["expect"],
+        lambda expect: [{"outcome": "undefined", "reason": "sliding"}, {"outcome": "undecided"}],
     ),
 }  # fmt: skip
 

@@ -295,6 +295,7 @@ NEW_SINCE = {
     f"{name}.jsonl"
     for name in (
         "at-the-horizon",
+        "no-time-left",
         "retraced-arc",
         "retraced-arc-trajectory",
         "flow",

@@ -92,8 +92,7 @@ def measured_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS
     if isinstance(outcome, Rejected):
         return Proved((Expectation("rejected"),))
     if isinstance(outcome, Undefined):
-        # A stepper in binary64 may find the tie within rounding, and say no more than that.
-        return Proved((Expectation("undefined", reason=outcome.reason), Expectation("undecided")), inf)
+        return Proved((Expectation("undefined", reason=outcome.reason),), inf)
     if isinstance(outcome, reference.Horizon):
         numbers = coasted(outcome, (Fraction(state.t),) * 2)
         step = certified(numbers, links.coast(numbers), None, digits=digits)
@@ -452,7 +451,7 @@ def certify(question: Question, number: int) -> Vector:
     else:
         is_step = question.kind == "step"
         proved = _step(scene, question) if is_step else proved_path(scene, question)
-    expect = with_refusal(proved.expect, scene, question.state, is_loose)
+    expect = with_further(proved.expect[0], scene, question.state, is_loose=is_loose)
     rounded = four_digits(min(proved.condition, INFINITE))
     vector = file_vector(question, number, proved._replace(expect=expect, condition=rounded), "stress")
     vector = msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
@@ -463,24 +462,26 @@ def certify(question: Question, number: int) -> Vector:
     return vector
 
 
-def with_refusal(
-    expect: tuple[Expectation, ...], scene: Scene | None, state: State, is_loose: bool
+def with_further(
+    known: Expectation, scene: Scene | None, state: State, *, is_loose: bool = False
 ) -> tuple[Expectation, ...]:
-    """Return right answers, with `rejected` among them where a rule permits it (`scene.protocol.rules`).
+    """Return a right answer with the further answers that the rules permit (`scene.protocol.rules`).
 
-    It comes first for a scene with fields that may be ignored, because `scene.from_data` refuses it.
+    A refusal comes first for a scene with fields that may be ignored, because `scene.from_data` refuses it.
 
     Args:
-        expect: the right answers but this one.
+        known: the right answer.
         scene: table and laws; None for none.
         state: the start.
         is_loose: whether the scene was given with fields that may be ignored.
     """
-    if scene is None or expect[0].outcome == "rejected":
-        return expect
+    if scene is None or known.outcome == "rejected":
+        return (known,)
+    # A stepper in binary64 may find a tie within rounding, and say no more than that.
+    found = (known, Expectation("undecided")) if known.outcome == "undefined" else (known,)
     if is_loose:
-        return (REFUSAL, *expect)
-    return (*expect, REFUSAL) if may_be_refused(scene, state) else expect
+        return (REFUSAL, *found)
+    return (*found, REFUSAL) if may_be_refused(scene, state) else found
 
 
 def judge(vector: Vector) -> Verdict:

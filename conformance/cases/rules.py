@@ -85,7 +85,7 @@ def _ask(draw: Draw, scene: Mapping[str, Any], state: Data | None = None, span: 
     """
     span = draw.pick((BRIEF, LONG)) if span is None else span
     if state is None:
-        x, y = INSIDE[scene.get("table") if scene.get("table") in INSIDE else "cap"]
+        x, y = INSIDE.get(str(scene.get("table")), INSIDE["cap"])
         vx, vy = draw.direction()
         state = {"t": 0.0, "x": x, "y": y, "vx": vx, "vy": vy, "wall": None}
     seq = draw.pick(range(1, 2**20))
@@ -145,7 +145,8 @@ def scene_types(draw: Draw, is_kept: bool) -> Sample:
     """Give a law as a number or an object, or as something else."""
     scene = _any_table(draw)
     name = draw.pick([name for name in scene if name != "table"])
-    bad = draw.pick(("1.0", True, [1.0], {}, [], "r"))
+    others: tuple[Any, ...] = ("1.0", True, [1.0], {}, [], "r")
+    bad = draw.pick(others)
     return _one_of(_ask(draw, scene if is_kept else {**scene, name: bad}), is_kept)
 
 
@@ -343,10 +344,13 @@ def whole_state(draw: Draw, is_kept: bool) -> Sample:
 def state_types(draw: Draw, is_kept: bool) -> Sample:
     """Give numbers, or something else in place of one."""
     request = _ask(draw, _any_table(draw))
-    bad = {draw.pick(("t", "x", "y", "vx", "vy")): draw.pick(("0.0", True, None, [0.0], {}))}
-    if draw.pick(range(6)) == 5:
-        bad = {"wall": draw.pick((1, True, ["arc"], {}))}
-    return _one_of({**request, "state": {**request["state"], **({} if is_kept else bad)}}, is_kept)
+    if is_kept:
+        return _good(request)
+    numbers: tuple[Any, ...] = ("0.0", True, None, [0.0], {})
+    walls: tuple[Any, ...] = (1, True, ["arc"], {})
+    name = draw.pick(("t", "x", "y", "vx", "vy", "wall"))
+    bad = draw.pick(walls if name == "wall" else numbers)
+    return Sample({**request, "state": {**request["state"], name: bad}}, None)
 
 
 @rule
@@ -544,10 +548,16 @@ def whole_request(draw: Draw, is_kept: bool) -> Sample:
 def request_types(draw: Draw, is_kept: bool) -> Sample:
     """Give each field its type, or another to one."""
     request = _ask(draw, _any_table(draw))
-    bad = draw.pick(
-        ({"t_end": "soon"}, {"t_end": None}, {"state": []}, {"state": None}, {"scene": "cap"}, {"scene": []})
+    others: tuple[tuple[str, Any], ...] = (
+        ("t_end", "soon"),
+        ("t_end", None),
+        ("state", []),
+        ("state", None),
+        ("scene", "cap"),
+        ("scene", []),
     )
-    return _one_of(request if is_kept else {**request, **bad}, is_kept)
+    name, bad = draw.pick(others)
+    return _one_of(request if is_kept else {**request, name: bad}, is_kept)
 
 
 @rule
@@ -574,12 +584,13 @@ def sequence(draw: Draw, is_kept: bool) -> Sample:
 def counts(draw: Draw, is_kept: bool) -> Sample:
     """Ask for a whole number of collisions and repeats within bounds, or not."""
     request = _ask(draw, CAP)
-    bad = draw.pick((-1, 1.5, "1", None, True))
+    others: tuple[Any, ...] = (-1, 1.5, "1", None, True)
+    bad = draw.pick(others)
     if draw.pick((False, True)):
         path = {**request, "cmd": "trajectory", "collisions": draw.pick((0, 1, 3)) if is_kept else bad}
         return _one_of(path, is_kept)
     timed = {name: part for name, part in request.items() if name != "t_end"} | {"cmd": "time"}
-    numbers = {"collisions": draw.pick((1, 3)), "repeat": draw.pick((1, 2))}
+    numbers: Data = {"collisions": draw.pick((1, 3)), "repeat": draw.pick((1, 2))}
     if not is_kept:
         numbers[draw.pick(("collisions", "repeat"))] = draw.pick((0, bad))
     return _one_of({**timed, **numbers}, is_kept)

@@ -15,7 +15,7 @@ The verifier states the rules again, because it imports nothing of ours. tests/t
 breaks each rule before each reader. CONTRIBUTING says how a rule is added.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from enum import Enum
 from fractions import Fraction
 from math import log2
@@ -318,7 +318,7 @@ def _fields_of(data: Any, tag: str, forms: Mapping[str, type[msgspec.Struct]]) -
     return (tag, *form.__struct_fields__) if form else ()
 
 
-def does_undecided_pass(outcomes: set[str]) -> bool:
+def does_undecided_pass(outcomes: Set[str]) -> bool:
     """Tell whether `undecided` passes for a question, by the outcomes that are listed as right.
 
     It does where a right answer may be refused: `undecided` says as little.

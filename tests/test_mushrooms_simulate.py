@@ -328,12 +328,13 @@ def stored(tmp_path_factory):
 
 
 def cluster(n_workers, processes):
+    """Return a cluster on free ports. Without an address its servers would ask for port 8787."""
     return distributed.LocalCluster(
         n_workers=n_workers,
         threads_per_worker=1,
         processes=processes,
-        dashboard_address=None,
-        worker_dashboard_address=None,
+        dashboard_address="127.0.0.1:0",
+        worker_dashboard_address="127.0.0.1:0",
         scheduler_port=0,
     )
 

@@ -28,6 +28,7 @@ from support.edges import EDGES, LATE_EDGES, REST, is_among
 from support.faults import FAULTS, HARMLESS
 from support.faulty_readers import refusing_lines
 from support.faulty_steppers import answers_to, faulty
+from support.runnable import runnable
 from support.schemas import validator
 from test_conformance_suite import made_up
 
@@ -62,7 +63,6 @@ KITS = ("C++, next hit", "Python, implicit domain", "Python, intersection and re
 LANGUAGES = ("Python", "C", "JavaScript", *KITS)
 # One vector in so many, to save time; `mushrooms check` grades them with all.
 EVERY = {"Python": 16, "C": 12, "JavaScript": 6, **dict(zip(KITS, (6, 24, 16), strict=True))}
-STRICT = ("-O1", "-Wall", "-Wextra", "-Werror")
 
 
 @pytest.fixture(scope="module")
@@ -70,15 +70,7 @@ def commands(tmp_path_factory) -> dict[str, Example]:
     """Return each program's command, or why it cannot run here."""
     folder = tmp_path_factory.mktemp("built")
     ours = {f"python -m {name}": Example((sys.executable, "-m", name), "") for name in SERVERS}
-    return ours | find_examples(folder, STRICT) | find_kit_examples(folder, STRICT)
-
-
-def runnable(example: Example) -> list[str]:
-    # A source that does not compile is a failure; a compiler that is absent is not.
-    if example.is_absent:
-        pytest.skip(example.why_not)
-    assert example.command, example.why_not
-    return list(example.command)
+    return ours | find_examples(folder, ["-O1"]) | find_kit_examples(folder, ["-O1"])
 
 
 @pytest.fixture

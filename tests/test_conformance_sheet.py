@@ -10,6 +10,7 @@ import pytest
 from support.depth import deep_but
 from support.faulty_steppers import answers_to
 from support.refusals import assert_refused
+from support.runnable import runnable
 
 from conformance import plain, vectors
 from conformance.harness.examples import FOLDER, compiled, find_examples
@@ -95,15 +96,12 @@ def graded(sheet, tmp_path, content: bytes, name: str = "answers.jsonl"):
 
 
 def test_what_comes_back_has_the_verdict_of_a_dialogue(sheet, tmp_path, tally):
-    example = find_examples(tmp_path)["C"]
-    if example.is_absent:
-        pytest.skip(example.why_not)
-    command = example.command
+    command = runnable(find_examples(tmp_path)["C"])
     questions = b"\n".join(sheet.lines())
     done = subprocess.run(command, input=questions, capture_output=True, check=True)
     run = graded(sheet, tmp_path, done.stdout)
     chosen = [*sorted({v.group for v in sheet.chosen}), "fresh", "property"]
-    there = suite.check(list(command), seed=SEED, groups=chosen, limits=Limits(timeout=60.0))
+    there = suite.check(command, seed=SEED, groups=chosen, limits=Limits(timeout=60.0))
     verdicts = {result.id: result.verdict for result in there.results}
     partly = {name for name, profiles in sheets.CHECKS.items() if len(profiles) < 3}
     same = {r.id: r.verdict for r in run.results if r.id in verdicts and r.id not in partly}
@@ -116,12 +114,9 @@ def test_what_comes_back_has_the_verdict_of_a_dialogue(sheet, tmp_path, tally):
 
 
 def test_the_example_in_fortran_is_accepted_for_caps(sheet, tmp_path):
-    built = compiled("Fortran", ["-O2"], FOLDER / "fortran" / "caps.f90", tmp_path / "caps")
-    if built.is_absent:
-        pytest.skip(built.why_not)
-    assert built.command, built.why_not
+    command = runnable(compiled("Fortran", ["-O2"], FOLDER / "fortran" / "caps.f90", tmp_path / "caps"))
     sheets.write_tables(sheet, tmp_path)
-    done = subprocess.run(built.command, cwd=tmp_path, capture_output=True, check=True)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
     run = graded(sheet, tmp_path, done.stdout, "answers.csv")
     assert run.objections() == []
     assert (run.scope().tables, run.scope().profiles) == (["cap"], ["step", "trajectory"])

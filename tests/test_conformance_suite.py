@@ -103,8 +103,8 @@ MET = {
     "split-line": (STEP, "wrong-format", "line"),
     "junk": (STEP, "wrong-format", "debug: stepping"),
     "blank-line": (STEP, "wrong-format", "''"),
-    "not-utf8": (STEP, "wrong-format", "utf-8"),
-    "not-utf8-in-a-further-field": (STEP, "wrong-format", "utf-8"),
+    "not-utf8": (STEP, "wrong-format", "can't decode byte 0xff"),
+    "not-utf8-in-a-further-field": (STEP, "wrong-format", "can't decode byte 0xe9"),
     "deep-nesting": (STEP, "wrong-format", "[[["),
     "nan": (STEP, "wrong-format", "JSON"),
     "infinity": (STEP, "wrong-format", "out of range"),
@@ -205,6 +205,15 @@ BESIDE = {
     "time": b'"ns":[1],"steps":[]',
 }
 LOST = b'{"seq":1,"states":[{"outcome":"%b","reason":"corner","captured":[1,2]}]}'
+# A reader that replaces, drops or passes what is no UTF-8 finds an answer in each.
+NO_UTF8 = (
+    b'{"seq":1,"outcome":"rejected","reason":"\xff"}',
+    b'{"seq":1,"outcome":"reje\xffcted","reason":"r"}',
+    b'{"seq":1,"error":"no","not\xe9":1}',
+    b'{"seq":1,"error":"no","a surrogate":"\xed\xa0\x80"}',
+    b'{"seq":1,"error":"no","a slash in two bytes":"\xc0\xaf"}',
+    '{"seq":1,"error":"no"}'.encode("utf-16"),
+)
 
 
 @pytest.mark.parametrize(
@@ -252,6 +261,8 @@ LOST = b'{"seq":1,"states":[{"outcome":"%b","reason":"corner","captured":[1,2]}]
         ),
         (b'{"seq":1,"error":"no","a\\u001bb":1,"a\\u001bb":1}', "step", "stands twice"),
         *((LOST % kind, "flow", "null") for kind in (b"rejected", b"undefined", b"undecided")),
+        *((line, "step", "can't decode byte 0x") for line in NO_UTF8),
+        (b'\xef\xbb\xbf{"seq":1,"error":"no"}', "step", "malformed"),
     ],
 )
 def test_misshapen_answers_are_named(line, cmd, word):

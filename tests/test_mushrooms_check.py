@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +20,7 @@ import conformance
 import scene as scenes
 from conformance import plain, vectors
 from conformance.bench import record, workloads
+from conformance.harness.examples import find_compiler
 from conformance.suite import pytest_suite, run as suite
 from conformance.suite.checks import flows
 from conformance.suite.session import Session
@@ -289,7 +289,7 @@ def test_a_benchmark_is_written_whole_and_again(command_line, tmp_path, monkeypa
     names = {p.solver for p in found.points}
     assert {"proof, 200 digits", "fast, lanes", "fast, pairs", "plain Python"} < names
     assert f"command {' '.join(one)}" in names
-    if shutil.which("cc"):
+    if find_compiler("C"):
         assert names >= {"lean C", "steps, flight/10", "steps, flight/100", "steps, flight/1000"}
         assert "baselines.c" in found.machine.compiled["lean C"]
     else:

@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -328,12 +329,13 @@ def stored(tmp_path_factory):
 
 
 def cluster(n_workers, processes):
+    """Return a cluster on free ports. Without an address its servers would ask for port 8787."""
     return distributed.LocalCluster(
         n_workers=n_workers,
         threads_per_worker=1,
         processes=processes,
-        dashboard_address=None,
-        worker_dashboard_address=None,
+        dashboard_address="127.0.0.1:0",
+        worker_dashboard_address="127.0.0.1:0",
         scheduler_port=0,
     )
 
@@ -534,20 +536,39 @@ def test_of_a_stored_run_only_its_histogram_is_drawn(command_line, stored, tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
+def when_written(folder):
+    """Return the time at which each block of a stored run was last written."""
+    return {path.name: path.stat().st_mtime_ns for path in (folder / MARKERS).glob("[0-9]*.marker")}
+
+
 @pytest.mark.deep
 def test_a_run_killed_at_random_moments_goes_on_to_the_same_bits(tmp_path):
-    """Processes are killed (SIGKILL) while they follow, and lengthen, a run; then one is left to finish."""
-    scene, random = "fermi-ulam", np.random.default_rng(1)
+    """Processes are killed (SIGKILL) while they follow, and lengthen, a run; then one is left to finish.
+
+    The moment is a number of blocks, so that it lies within the run on any machine.
+    """
+    scene = "fermi-ulam"
+    n_blocks = 75
+    n_kills = int(os.environ.get("MUSHROOMS_KILLS", "2"))
+    random = np.random.default_rng(1)
     options = ["--particles", "1500", "--energy", "1e3", "--block", "20", "--threads", "1", "--resume"]
     wanted = fast.simulate(load(scene), n_particles=1500, energy=1e3, n_cycles=2).sha256()
     command = [sys.executable, "-m", "mushrooms", "simulate", scene, *options, "--json"]
-    for number in range(int(os.environ.get("MUSHROOMS_KILLS", "2"))):
-        place = ["--out", str(tmp_path / str(number // 5)), "--cycles", str(1 + (number % 5 > 2))]
+    folders = [tmp_path / str(number // 2) for number in range(n_kills)]
+    for number, folder in enumerate(folders):
+        place = ["--out", str(folder), "--cycles", str(1 + number % 2)]
+        before = when_written(folder)
+        n_more = random.integers(1, n_blocks // 2)
+        give_up = time.monotonic() + 300.0  # a child that writes nothing
         child = subprocess.Popen([*command, *place], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        time.sleep(random.uniform(1.0, 4.0))  # its start takes a second
+        while len(when_written(folder).items() - before.items()) < n_more:
+            assert child.poll() is None, "it ended before it was killed"
+            assert time.monotonic() < give_up, "it writes nothing"
+            time.sleep(0.001)
         child.kill()
-        child.wait()
-    for folder in tmp_path.iterdir():
+        assert child.wait() == -signal.SIGKILL
+        assert len(when_written(folder).items() - before.items()) < n_blocks
+    for folder in dict.fromkeys(folders):
         place = ["--out", str(folder), "--cycles", "2"]
         done = subprocess.run([*command, *place], capture_output=True, text=True, check=True)
         assert json.loads(done.stdout)["sha256"] == wanted

@@ -265,7 +265,7 @@ FAULTS: dict[str, tuple[str, Act]] = {
     "infinity": ("step", writes(lambda line: line.replace(b"-0.6", b"1e999"))),
     "endless-line": ("step", forever(writes(lambda _: b"9" * 2**20))),
     "half-a-line": ("step", then(writes(lambda line: line[:40]), sleep)),
-    "not-utf8": ("step", writes(lambda line: line.replace(b"collision", b"\xff\xfe"))),
+    "not-utf8": ("step", writes(lambda line: line.replace(b"collision", b"coll\xffision"))),
     "not-utf8-in-a-further-field": ("step", writes(lambda line: line[:-2] + b', "note": "\xe9"}\n')),
     "banner": ("start", writes(lambda line: b"Welcome to the stepper!\n" + line)),
     # Numbers are misread or misprinted.

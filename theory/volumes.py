@@ -16,6 +16,7 @@ import numpy as np
 from mpmath import fp
 
 from scene.laws import Law, value
+from scene.precision import reduce_record
 from scene.refusal import BadInput, check_number, shown
 from scene.tables import Mushroom, Scene, check_scene
 from scene.transforms import scaled
@@ -37,6 +38,10 @@ class Volumes(NamedTuple):
     v_ell: Any
     v_cha: Any
     nu: Any
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Tell pickle and copy how to keep every bit."""
+        return reduce_record(self)
 
 
 def v_cap(ctx: Any, r: Any) -> Any:

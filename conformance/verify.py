@@ -1262,11 +1262,7 @@ def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
         Contradicted: its claim is false.
         Unproved: its claim is open.
     """
-    answers = take(record, "expect", list) or [None]
-    # What is proved is the answer that does more than refuse, if one does.
-    outcomes = [take(answer, "outcome", str) for answer in answers]
-    place = next((i for i, outcome in enumerate(outcomes) if outcome != "rejected"), 0)
-    first, others = answers[place], answers[:place] + answers[place + 1 :]
+    first, others = read_answers(record)
     state, steps = take(record, "state", dict), take({"steps": [], **first}, "steps", list)
     kind, count = take(record, "kind", str), record.get("collisions", 1)
     is_kind = kind in ("step", "trajectory", "flow") and type(count) is int and 0 < count < 10**6
@@ -1306,10 +1302,32 @@ def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
         _, is_more = without_loose(state, (*FIELDS, "wall"))
         if scene.is_loose or is_more or is_extreme(scene, given, bits):
             allowed.append({"outcome": "rejected"})
+    require_listed(others, allowed)
+
+
+def read_answers(record: Any) -> tuple[Any, list[Any]]:
+    """Return the answer of a line that is to be proved, which does more than refuse if one does.
+
+    Returns:
+        It, and the further answers.
+    """
+    answers = take(record, "expect", list) or [None]
+    outcomes = [take(answer, "outcome", str) for answer in answers]
+    place = next((i for i, outcome in enumerate(outcomes) if outcome != "rejected"), 0)
+    return answers[place], answers[:place] + answers[place + 1 :]
+
+
+def require_listed(others: Sequence[Any], permitted: Sequence[Any]) -> None:
+    """Require that a line lists each further answer that the rules permit, once, and no other.
+
+    Raises:
+        Contradicted: it does not.
+    """
     require(
-        all(other in allowed for other in others), Contradicted("no rule permits a further answer")
+        all(other in permitted for other in others),
+        Contradicted("no rule permits a further answer"),
     )
-    is_listed = all(others.count(permitted) == 1 for permitted in allowed)
+    is_listed = all(others.count(answer) == 1 for answer in permitted)
     require(is_listed, Contradicted("each further answer that is permitted must be listed, once"))
 
 

@@ -22,7 +22,8 @@ import fast.__main__ as fast_server
 import reference.__main__ as reference_server
 from conformance import plain, verify
 from conformance.cases.certify import claimed_path, with_further
-from conformance.cases.rules import DRAWS, Sample, sample
+from conformance.cases.rule_scenes import DRAWS, RuleCase
+from conformance.cases.rules import sample
 from conformance.grading import agreement
 from conformance.harness.python.stepper import timed
 from conformance.suite.process import CheckFailure
@@ -41,7 +42,7 @@ from scene import (
 )
 from scene.load import json_schema
 from scene.protocol import rules
-from scene.protocol.rules import BY_NAME, RULES, Duty, Rule, is_late, without_loose
+from scene.protocol.rules import BY_NAME, RULES, Duty, ProtocolRule, is_late, without_loose
 from scene.states import ON_WALL, check_numbers
 
 N_DRAWS = 6  # on each side of each rule
@@ -57,7 +58,7 @@ BY_REQUEST = {
 RECORDED = [rule for rule in ASKED if rule.name not in BY_REQUEST]
 
 
-def by_name(rule: Rule) -> str:
+def by_name(rule: ProtocolRule) -> str:
     return rule.name
 
 
@@ -66,7 +67,7 @@ every_answered = pytest.mark.parametrize("rule", ANSWERED, ids=by_name)
 every_recorded = pytest.mark.parametrize("rule", RECORDED, ids=by_name)
 
 
-def sides(rule: Rule) -> list[tuple[Sample, bool]]:
+def sides(rule: ProtocolRule) -> list[tuple[RuleCase, bool]]:
     """Return questions on both sides of a rule, each with whether it is kept."""
     return [(sample(rule.name, key, is_kept), is_kept) for is_kept in (True, False) for key in range(N_DRAWS)]
 
@@ -102,7 +103,7 @@ def test_a_rule_that_is_changed_is_not_on_the_page(rule, change, monkeypatch):
 # The schema
 
 
-def differs_in_schema(rule: Rule, valid: Any) -> list[Any]:
+def differs_in_schema(rule: ProtocolRule, valid: Any) -> list[Any]:
     """Return the questions of which a schema says something else than a rule."""
     return [
         drawn.request
@@ -172,7 +173,7 @@ def outcomes(server: Server, text: str) -> list[str]:
     return [part.get("outcome", "error") for part in outcomes_of(answer)]
 
 
-def differs_in_scene(rule: Rule, n: int = N_DRAWS) -> list[Any]:
+def differs_in_scene(rule: ProtocolRule, n: int = N_DRAWS) -> list[Any]:
     """Return the questions that `scene` should refuse and does not, or refuses and should not."""
     due = rule.otherwise in (Duty.REJECT, Duty.IGNORE) and rule.name not in BY_PLACE
     asked = [(sample(rule.name, key, is_kept), is_kept) for is_kept in (True, False) for key in range(n)]
@@ -200,7 +201,7 @@ def test_a_scene_with_another_limit_is_seen(name, limit, monkeypatch):
 
 
 @cache
-def line_of(rule: Rule, key: int, is_kept: bool) -> Vector:
+def line_of(rule: ProtocolRule, key: int, is_kept: bool) -> Vector:
     """Return a question as a line of the corpus, with all answers that the rule permits."""
     drawn = sample(rule.name, key, is_kept)
     request = json.loads(json.dumps(drawn.request))
@@ -237,7 +238,7 @@ def judge(line: Any, by: ModuleType) -> str:
         return "broken down"
 
 
-def verdicts(rule: Rule, key: int, is_kept: bool, by: ModuleType = verify) -> dict[str, str]:
+def verdicts(rule: ProtocolRule, key: int, is_kept: bool, by: ModuleType = verify) -> dict[str, str]:
     """Return what the verifier says of a line, and of the line with an answer more or one less."""
     drawn, vector = sample(rule.name, key, is_kept), line_of(rule, key, is_kept)
     line = json.loads(msgspec.json.encode(vector))
@@ -257,7 +258,7 @@ def verdicts(rule: Rule, key: int, is_kept: bool, by: ModuleType = verify) -> di
     return found
 
 
-def differs_in_verifier(rule: Rule, by: ModuleType = verify, n: int = N_DRAWS) -> list[Any]:
+def differs_in_verifier(rule: ProtocolRule, by: ModuleType = verify, n: int = N_DRAWS) -> list[Any]:
     """Return the lines that are not proved, or are proved with an answer more or less than permitted."""
     return [
         (sample(rule.name, key, is_kept), found)
@@ -329,7 +330,7 @@ def graded(vector: Vector, outcome: str) -> str:
     return agreement.grade(vector, {"steps": parts}).verdict
 
 
-def differs_in_grading(rule: Rule, n: int = N_DRAWS) -> list[Any]:
+def differs_in_grading(rule: ProtocolRule, n: int = N_DRAWS) -> list[Any]:
     """Return the lines whose grades are not what a rule says."""
     found = []
     for is_kept in (True, False):
@@ -396,7 +397,7 @@ STEPPERS: dict[str, Server] = {
 }
 
 
-def as_profile(drawn: Sample, profile: str) -> Sample:
+def as_profile(drawn: RuleCase, profile: str) -> RuleCase:
     """Ask for a path or a flow in place of a step, where a step is asked for."""
     if (
         drawn.request.get("cmd") != "step"
@@ -416,10 +417,12 @@ def as_profile(drawn: Sample, profile: str) -> Sample:
             "states": [request["state"]],
         }
 
-    return Sample(changed(drawn.request), changed(drawn.as_read))
+    return RuleCase(changed(drawn.request), changed(drawn.as_read))
 
 
-def differs_in_stepper(rule: Rule, server: Server, profile: str = "step", n: int = N_DRAWS) -> list[Any]:
+def differs_in_stepper(
+    rule: ProtocolRule, server: Server, profile: str = "step", n: int = N_DRAWS
+) -> list[Any]:
     """Return the questions that a stepper answers otherwise than a rule says; it may be undecided."""
     found = []
     for is_kept in (True, False):

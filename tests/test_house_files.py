@@ -24,11 +24,11 @@ LONGER = {"conformance/verify.py": "one file that anyone can read and run, witho
 # last raise, so that a mend never waits for a bound. A bound rises in the commit that adds a capability, and
 # that commit says why. Tests have none: a regression test never has to buy its place.
 MAX_STATEMENTS = {
-    "scene": 1_413,
+    "scene": 1_515,
     "reference": 1_346,
     "fast": 3_435,
     "theory": 2_147,
-    "conformance": 8_719,
+    "conformance": 9_170,
     "mushrooms": 3_537,
     "docs": 132,
     ".ci": 41,

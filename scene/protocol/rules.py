@@ -66,7 +66,7 @@ class Duty(Enum):
         return self is Duty.REJECT
 
 
-class Rule(NamedTuple):
+class ProtocolRule(NamedTuple):
     """A row of the table.
 
     Attributes:
@@ -88,15 +88,17 @@ class Rule(NamedTuple):
 
 
 RULES = (
-    Rule("known-table", "scene", "`table` is cap, stem or mushroom", Duty.REJECT, in_schema=True),
-    Rule("whole-scene", "scene", "no required field is missing", Duty.REJECT, in_schema=True),
-    Rule("scene-types", "scene", "each field has its type", Duty.REJECT, in_schema=True),
-    Rule("one-mouth", "scene", "a mushroom gives exactly one of `w` and `nu`", Duty.REJECT, in_schema=True),
-    Rule("sizes", "scene", "r, h, w > 0 at all times", Duty.REJECT),
-    Rule("mouth-in-base", "scene", "w <= r at all times", Duty.REJECT),
-    Rule("sides-apart", "scene", "w > h slope at all times", Duty.REJECT),
-    Rule("one-period", "scene", "all laws that move have exactly the same period", Duty.REJECT),
-    Rule(
+    ProtocolRule("known-table", "scene", "`table` is cap, stem or mushroom", Duty.REJECT, in_schema=True),
+    ProtocolRule("whole-scene", "scene", "no required field is missing", Duty.REJECT, in_schema=True),
+    ProtocolRule("scene-types", "scene", "each field has its type", Duty.REJECT, in_schema=True),
+    ProtocolRule(
+        "one-mouth", "scene", "a mushroom gives exactly one of `w` and `nu`", Duty.REJECT, in_schema=True
+    ),
+    ProtocolRule("sizes", "scene", "r, h, w > 0 at all times", Duty.REJECT),
+    ProtocolRule("mouth-in-base", "scene", "w <= r at all times", Duty.REJECT),
+    ProtocolRule("sides-apart", "scene", "w > h slope at all times", Duty.REJECT),
+    ProtocolRule("one-period", "scene", "all laws that move have exactly the same period", Duty.REJECT),
+    ProtocolRule(
         "known-scene-fields",
         "scene",
         "the table has each of its fields",
@@ -105,7 +107,7 @@ RULES = (
         " many JSON libraries drop what they do not know.",
         in_schema=True,
     ),
-    Rule(
+    ProtocolRule(
         "texts",
         "scene",
         "`name` and `notes` are text without control characters other than tab and line ends",
@@ -113,7 +115,7 @@ RULES = (
         "They have no effect on the motion, so a stepper need not read them.",
         in_schema=True,
     ),
-    Rule(
+    ProtocolRule(
         "no-null",
         "scene",
         "no optional field of a scene or a law is null",
@@ -122,9 +124,11 @@ RULES = (
         " question.",
         in_schema=True,
     ),
-    Rule("known-kind", "law", "`kind` is fourier or bang-bang", Duty.REJECT, in_schema=True),
-    Rule("one-rate", "law", "exactly one of `omega` and `period` is given", Duty.REJECT, in_schema=True),
-    Rule(
+    ProtocolRule("known-kind", "law", "`kind` is fourier or bang-bang", Duty.REJECT, in_schema=True),
+    ProtocolRule(
+        "one-rate", "law", "exactly one of `omega` and `period` is given", Duty.REJECT, in_schema=True
+    ),
+    ProtocolRule(
         "positive-rate",
         "law",
         "`omega` > 0 and `period` > 0",
@@ -132,7 +136,7 @@ RULES = (
         "With omega = 0 the law has no period. A negative omega is another way to write the same law.",
         in_schema=True,
     ),
-    Rule(
+    ProtocolRule(
         "harmonics",
         "law",
         f"`cos` and `sin` have at most {MAX_HARMONICS} numbers each",
@@ -141,10 +145,10 @@ RULES = (
         " dropped the further ones would answer for another scene.",
         in_schema=True,
     ),
-    Rule("knots", "law", f"there are 2 to {MAX_KNOTS} knots", Duty.REJECT, in_schema=True),
-    Rule("rising-times", "law", "the times of the knots increase strictly", Duty.REJECT),
-    Rule("closed-law", "law", "the last knot has the value of the first", Duty.REJECT),
-    Rule(
+    ProtocolRule("knots", "law", f"there are 2 to {MAX_KNOTS} knots", Duty.REJECT, in_schema=True),
+    ProtocolRule("rising-times", "law", "the times of the knots increase strictly", Duty.REJECT),
+    ProtocolRule("closed-law", "law", "the last knot has the value of the first", Duty.REJECT),
+    ProtocolRule(
         "exact-period",
         "law",
         "tn - t0 is a binary64 number, exactly",
@@ -152,28 +156,30 @@ RULES = (
         "Otherwise no `period` of another law could equal it. Knots at 0.1, 0.5, 1.1 are refused, because"
         " 1.1 - 0.1 is no binary64 number.",
     ),
-    Rule("known-law-fields", "law", "the kind has each of the law's fields", Duty.IGNORE, in_schema=True),
-    Rule("whole-state", "state", "no required field is missing", Duty.REJECT, in_schema=True),
-    Rule("state-types", "state", "each field has its type", Duty.REJECT, in_schema=True),
-    Rule("known-wall", "state", "`wall` is null or the name of a wall", Duty.REJECT, in_schema=True),
-    Rule("own-wall", "state", "the table has the wall that is named", Duty.REJECT),
-    Rule("inside", "state", "the particle is not beyond a wall", Duty.REJECT),
-    Rule(
+    ProtocolRule(
+        "known-law-fields", "law", "the kind has each of the law's fields", Duty.IGNORE, in_schema=True
+    ),
+    ProtocolRule("whole-state", "state", "no required field is missing", Duty.REJECT, in_schema=True),
+    ProtocolRule("state-types", "state", "each field has its type", Duty.REJECT, in_schema=True),
+    ProtocolRule("known-wall", "state", "`wall` is null or the name of a wall", Duty.REJECT, in_schema=True),
+    ProtocolRule("own-wall", "state", "the table has the wall that is named", Duty.REJECT),
+    ProtocolRule("inside", "state", "the particle is not beyond a wall", Duty.REJECT),
+    ProtocolRule(
         "on-its-wall",
         "state",
         f"the particle is within 2^{log2(ON_WALL):.0f} of the size of the wall that it names",
         Duty.REJECT,
     ),
-    Rule(
+    ProtocolRule(
         "before-its-end", "state", "the particle is not past the end of the wall that it names", Duty.REJECT
     ),
-    Rule(
+    ProtocolRule(
         "leaves-its-wall",
         "state",
         "a particle on one wall does not move into it, relative to the wall's own motion",
         Duty.REJECT,
     ),
-    Rule(
+    ProtocolRule(
         "one-wall",
         "state",
         "the particle is not on two walls at once",
@@ -181,7 +187,7 @@ RULES = (
         "In a corner and at the mouth's edge there is no normal, so nothing tells whether a particle moves"
         " into a wall: this holds whichever way it moves. The reason is corner or mouth-edge.",
     ),
-    Rule(
+    ProtocolRule(
         "lifts-off",
         "state",
         "a particle on a wall leaves it",
@@ -189,7 +195,7 @@ RULES = (
         "A particle along its wall has f' = 0 there, and f'' > 0 if it leaves. The reason is sliding, or"
         " tangency where f'' = 0 on a wall of a moving table.",
     ),
-    Rule(
+    ProtocolRule(
         "early",
         "state",
         "abs(t) is less than 2^30 periods, or 2^30 units of time if nothing moves",
@@ -197,34 +203,36 @@ RULES = (
         "A phase so far from time 0 has few correct digits in binary64, before time 0 as well as after it."
         " Therefore abs(t) counts. The period 2 pi / omega is the exact one.",
     ),
-    Rule(
+    ProtocolRule(
         "small",
         "state",
         "t, x, y, vx and vy are below 1e100 in size",
         Duty.MAY_REJECT,
         "Squares and cubes of larger numbers overflow.",
     ),
-    Rule(
+    ProtocolRule(
         "known-state-fields",
         "state",
         "the protocol has each of the state's fields",
         Duty.IGNORE,
         in_schema=True,
     ),
-    Rule("known-command", "request", "`cmd` is one of this page", Duty.REJECT, in_schema=True),
-    Rule("whole-request", "request", "no required field is missing", Duty.REJECT, in_schema=True),
-    Rule("request-types", "request", "each field has its type", Duty.REJECT, in_schema=True),
-    Rule("finite", "request", "each number is finite in binary64", Duty.REJECT),
-    Rule("sequence", "request", "`seq` is a whole number from 0 to 2^53", Duty.REJECT, in_schema=True),
-    Rule(
+    ProtocolRule("known-command", "request", "`cmd` is one of this page", Duty.REJECT, in_schema=True),
+    ProtocolRule("whole-request", "request", "no required field is missing", Duty.REJECT, in_schema=True),
+    ProtocolRule("request-types", "request", "each field has its type", Duty.REJECT, in_schema=True),
+    ProtocolRule("finite", "request", "each number is finite in binary64", Duty.REJECT),
+    ProtocolRule(
+        "sequence", "request", "`seq` is a whole number from 0 to 2^53", Duty.REJECT, in_schema=True
+    ),
+    ProtocolRule(
         "counts",
         "request",
         "`collisions` is a whole number >= 0 (in `time`, >= 1), `repeat` one >= 1",
         Duty.REJECT,
         in_schema=True,
     ),
-    Rule("end-not-before", "request", "`t_end` >= state.t", Duty.REJECT),
-    Rule(
+    ProtocolRule("end-not-before", "request", "`t_end` >= state.t", Duty.REJECT),
+    ProtocolRule(
         "time-left",
         "request",
         "`t_end` > state.t",
@@ -233,26 +241,28 @@ RULES = (
         " particle in a corner, at the mouth's edge or along a wall, from which no flight is defined. A state"
         " that must be rejected is rejected.",
     ),
-    Rule(
+    ProtocolRule(
         "known-request-fields", "request", "the command has each of the fields", Duty.IGNORE, in_schema=True
     ),
-    Rule(
+    ProtocolRule(
         "fields-once",
         "request",
         "no object has a field twice",
         Duty.EITHER,
         "JSON readers differ, and most do not tell.",
     ),
-    Rule(
+    ProtocolRule(
         "answer-fields-once",
         "answer",
         "no object has a field twice",
         Duty.WRONG_FORMAT,
         "The suite would have to choose one of two values. This holds for unknown fields, too.",
     ),
-    Rule("same-seq", "answer", "`seq` is that of the request", Duty.WRONG_FORMAT),
-    Rule("finite-answers", "answer", "each number is finite in binary64", Duty.WRONG_FORMAT),
-    Rule("capture-at-the-end", "answer", "only an entry `horizon` has a capture interval", Duty.WRONG_FORMAT),
+    ProtocolRule("same-seq", "answer", "`seq` is that of the request", Duty.WRONG_FORMAT),
+    ProtocolRule("finite-answers", "answer", "each number is finite in binary64", Duty.WRONG_FORMAT),
+    ProtocolRule(
+        "capture-at-the-end", "answer", "only an entry `horizon` has a capture interval", Duty.WRONG_FORMAT
+    ),
 )
 BY_NAME = {rule.name: rule for rule in RULES}
 

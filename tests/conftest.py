@@ -129,7 +129,9 @@ def _two_cores() -> Iterator[None]:
 @pytest.fixture(scope="session")
 def corpus() -> list[Vector]:
     """Return all vectors."""
-    return load("stress")
+    found = load("stress")
+    assert len(found) > 2000
+    return found
 
 
 @pytest.fixture

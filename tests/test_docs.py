@@ -8,6 +8,7 @@ import os
 import pkgutil
 import re
 import shlex
+import socket
 import subprocess
 import sys
 import tomllib
@@ -105,14 +106,17 @@ def test_the_tutorial_does_what_it_says(tmp_path):
 @pytest.mark.deep
 @pytest.mark.parametrize("name", ["one-node.sh", "energies.sh", "several-nodes.sh"])
 def test_the_scripts_for_a_cluster_run(tmp_path, name):
-    """With few particles, another port, and functions in place of SLURM's commands."""
+    """With few particles, a free port, and functions in place of SLURM's commands."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
     script = re.sub(r"--particles \S+", "--particles 64", dict(blocks("clusters.md", "bash"))[name])
     job = {"SLURM_CPUS_PER_TASK": "1", "SLURM_ARRAY_TASK_ID": "0", "SLURM_JOB_ID": "7"}
     done = subprocess.run(
         [
             "bash",
             "-c",
-            'srun() { "$@"; }; hostname() { echo 127.0.0.1; }\n' + script.replace("8786", "18786"),
+            'srun() { "$@"; }; hostname() { echo 127.0.0.1; }\n' + script.replace("8786", str(port)),
         ],
         env={**os.environ, **job, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"},
         cwd=tmp_path,

@@ -50,6 +50,7 @@ def measured(workload, *these):
 
 @pytest.mark.parametrize("name", workloads.NAMES)
 def test_answers_of_a_workload_are_collisions_as_the_fast_stepper_finds_them(drawn, name):
+    assert len(drawn[name].questions) == 3
     for q in drawn[name].questions:
         assert q.truth.outcome == "collision"
         met = fast.next_collision(drawn[name].scene, q.state, q.t_end)

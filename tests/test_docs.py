@@ -8,6 +8,7 @@ import os
 import pkgutil
 import re
 import shlex
+import socket
 import subprocess
 import sys
 import tomllib
@@ -105,14 +106,17 @@ def test_the_tutorial_does_what_it_says(tmp_path):
 @pytest.mark.deep
 @pytest.mark.parametrize("name", ["one-node.sh", "energies.sh", "several-nodes.sh"])
 def test_the_scripts_for_a_cluster_run(tmp_path, name):
-    """With few particles, another port, and functions in place of SLURM's commands."""
+    """With few particles, a free port, and functions in place of SLURM's commands."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
     script = re.sub(r"--particles \S+", "--particles 64", dict(blocks("clusters.md", "bash"))[name])
     job = {"SLURM_CPUS_PER_TASK": "1", "SLURM_ARRAY_TASK_ID": "0", "SLURM_JOB_ID": "7"}
     done = subprocess.run(
         [
             "bash",
             "-c",
-            'srun() { "$@"; }; hostname() { echo 127.0.0.1; }\n' + script.replace("8786", "18786"),
+            'srun() { "$@"; }; hostname() { echo 127.0.0.1; }\n' + script.replace("8786", str(port)),
         ],
         env={**os.environ, **job, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"},
         cwd=tmp_path,
@@ -391,6 +395,7 @@ def test_the_python_of_a_page_does_what_it_says(name):
 @pytest.mark.parametrize("name", deep_but(["start.md", "your-scene.md", "scenes.md"], "scenes.md"))
 def test_the_commands_of_a_page_do_what_they_say(command_line, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
+    assert "console" in {first for first, _ in fences(name)}
     for first, text in fences(name):
         kind, _, file = first.partition(" ")
         if kind == "toml":
@@ -410,14 +415,17 @@ def test_the_commands_of_a_page_do_what_they_say(command_line, tmp_path, monkeyp
 @pytest.mark.deep
 def test_the_pictures_of_the_pages_are_made(tmp_path):
     """All of them, by the code that stands above each; a page shows every picture that it makes."""
+    n_made = 0
     for page in DOCS.glob("*.md"):
         shown = re.findall(r"\]\(generated/([^)]+)\)", page.read_text("utf-8"))
         pictures.draw(page, tmp_path)
         made = [name for name, _ in pictures.blocks(page)]
+        n_made += len(made)
         assert sorted(made) == sorted(shown)
         for name in made:
             start = {".svg": b"<?xml", ".png": b"\x89PNG", ".gif": b"GIF89a"}[Path(name).suffix]
             assert (tmp_path / name).read_bytes().startswith(start)
+    assert n_made > 10
 
 
 def test_a_block_that_fails_is_not_passed_over(tmp_path):

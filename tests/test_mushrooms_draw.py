@@ -34,7 +34,9 @@ N_COLLISIONS, ENERGY, SEED = 300, 1e5, 3
 
 @pytest.fixture(scope="module")
 def moving():
-    return orbits.follow(MOVING, N_COLLISIONS, energy=ENERGY, seed=SEED, n_orbits=6)
+    followed = orbits.follow(MOVING, N_COLLISIONS, energy=ENERGY, seed=SEED, n_orbits=6)
+    assert len(followed) == 6
+    return followed
 
 
 def whispering(scene: scenes.Scene = STATIC, n: int = N_COLLISIONS) -> orbits.FollowedOrbit:
@@ -44,7 +46,9 @@ def whispering(scene: scenes.Scene = STATIC, n: int = N_COLLISIONS) -> orbits.Fo
 
 def test_an_orbit_is_the_particle_of_the_ensemble(moving):
     ensemble = fast.simulate(MOVING, n_particles=6, energy=10.0, seed=SEED)
-    for i, orbit in enumerate(orbits.follow(MOVING, 1, energy=10.0, seed=SEED, n_orbits=6)):
+    followed = orbits.follow(MOVING, 1, energy=10.0, seed=SEED, n_orbits=6)
+    assert len(followed) == 6
+    for i, orbit in enumerate(followed):
         assert orbit.energies()[0] == pytest.approx(10.0, rel=1e-14)
         whole = fast.trajectory(MOVING, orbit.start, 10**6, math.tau).outcome
         assert isinstance(whole, scenes.Horizon)

@@ -100,7 +100,7 @@ REFUSED: list[Any] = [
     (f"{STORED} --block 0", ["'--block': 0, must be 1 to 1048576"]),
     (f"{STORED} --block 1e29", ["must be 1 to 1048576"]),
     (f"{STORED} --max-seconds 0", ["'--max-seconds': 0.0,", "> 0"]),
-    (f"{ONE} --threads 999", ["threads = 999"]),
+    (f"{ONE} --threads 999999", ["threads = 999999"]),
     ("theory moving-cap --digits 0", ["'--digits': 0,", "1 to 1000"]),
     ("theory moving-cap --digits 1001", ["'--digits': 1001,", "1 to 1000"]),
     ("theory moving-cap --energy 0", ["'--energy': 0.0,"]),

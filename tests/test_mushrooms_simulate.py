@@ -8,10 +8,12 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
 import weakref
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -326,6 +328,16 @@ def stored(tmp_path_factory):
     with pytest.raises(SystemExit, match="0"):
         run([*map(str, RUN), "--out", str(folder), "--block", "64", "--phases", "0.25,0.5"])
     return folder
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _taken_port():
+    """Take the port that Dask's servers ask for by default, as another cluster on this machine does."""
+    with socket.socket() as taken:
+        with suppress(OSError):  # another has it
+            taken.bind(("127.0.0.1", 8787))
+            taken.listen()
+        yield
 
 
 def cluster(n_workers, processes):

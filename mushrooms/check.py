@@ -23,7 +23,15 @@ from conformance.suite.sheet import (
     write_lines,
     write_tables,
 )
-from mushrooms.output import Watch, check_file, new_console, progress_bar, refuse_unheeded, writable_folder
+from mushrooms.output import (
+    Watch,
+    check_file,
+    new_console,
+    print_table,
+    progress_bar,
+    refuse_unheeded,
+    writable_folder,
+)
 from scene import BadInput
 
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
@@ -135,7 +143,7 @@ def show(run: Run) -> None:
         row = [group.group, str(group.cases), *counts, *graded, group.precision]
         table.add_row(*row, end_section=group is groups[-2])
     console = new_console(soft_wrap=True)
-    console.print(table)
+    print_table(console, table)
     if run.speed:
         console.print(
             f"Speed on {run.speed.scene}: {run.speed.best_ns:.4g} ns per collision,"

@@ -8,13 +8,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import fast
-from conformance.audit.runs import scene_named
+from conformance.audit.runs import is_scene, scene_named
 from conformance.files import write_file
 from mushrooms import orbits
 from mushrooms.figures import energies, orbits as pictures, style, table as tables
-from mushrooms.output import TABLES, announce_compilation, check_file, progress_bar, refuse_unheeded
+from mushrooms.output import announce_compilation, check_file, progress_bar, refuse_unheeded
 from mushrooms.simulate import draw_energies
 from mushrooms.store.run import is_run, open_run
+from mushrooms.tables import SUFFIXES
 from scene import BadInput, Scene, Stem
 from scene.laws import bounds
 from scene.tables import laws
@@ -83,14 +84,14 @@ def draw_scene(
     name: str, out: Path | None, kinds: list[str], export: Path | None, options: DrawOptions
 ) -> None:
     """Draw pictures of a scene, or of a stored run, and export a trajectory; print the names of the files."""
-    if is_run(Path(name)):
+    if is_run(Path(name)) or (Path(name).is_dir() and not is_scene(name)):
         asked = {f"--{kind}": True for kind in kinds} | {"--export": export}
         refuse_unheeded(asked | options.given(), f"{name!r} is a run")
         _draw_run(Path(name), out)
         return
     scene = scene_named(name)
     _check_heeded(kinds, export, options)
-    check_file(export, tuple(TABLES))
+    check_file(export, SUFFIXES)
     is_drawn = kinds or export is None or out is not None
     paths = _paths(scene, out or Path(f"{Path(name).stem}.svg"), kinds) if is_drawn else {}
     with announce_compilation():

@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 from rich.markup import escape
-from rich.table import Column, Table
+from rich.table import Table
 
 import fast
 import reference
@@ -28,7 +28,8 @@ from conformance.suite.run import N_FRESH, Transform, draw_transform
 from conformance.suite.session import Session, outcomes_of
 from conformance.suite.sheet import read_number, read_rows
 from mushrooms.check import format_outcome
-from mushrooms.output import announce_compilation, check_file, new_console, progress_bar
+from mushrooms.output import announce_compilation, check_file, new_console, print_table, progress_bar
+from mushrooms.tables import check_digest
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined, from_data
 from scene.refusal import shown
 
@@ -151,14 +152,13 @@ def _row(tally: Any) -> dict[str, Any]:
 
 def _print(tallies: list[Any]) -> None:
     heads = ("cases", "agreed", "undecided", "refused", "open", "wrong", "worst ulps", "slowest s")
-    # The name is needed to ask again: a narrow terminal cuts the heads instead.
-    table = Table(Column("family", no_wrap=True), *heads, title="Attacks: verdicts of all steppers asked")
+    table = Table("family", *heads, title="Attacks: verdicts of all steppers asked")
     for tally in tallies:
         counts = [str(count) for count in tally.counts.values()]
         table.add_row(
             tally.family, str(tally.n_cases), *counts, f"{tally.worst_ulps:.3g}", f"{tally.slowest:.2f}"
         )
-    new_console().print(table)
+    print_table(new_console(), table)
     for tally in tallies:
         for kind in ("open", "wrong"):
             for case in tally.cases[kind]:
@@ -194,6 +194,7 @@ def verify_file(file: Path, scene: str | None, picture: Path | None) -> int:
 def _of_rows(file: Path, label: str, scene: str) -> dict[str, Any]:
     """Return a CSV file as the verifier takes a trajectory."""
     states = []
+    check_digest(file, label)
     for place, row in read_rows(file, label, FIELDS):
         numbers = {name: read_number(place, name, row[name]) for name in FIELDS}
         states.append({**numbers, "wall": row.get("wall") or None})

@@ -10,7 +10,7 @@ from rich.table import Table
 import scene as scenes
 import theory
 from conformance.audit.runs import SCENES, scene_named
-from mushrooms.output import new_console, print_pairs, progress_bar
+from mushrooms.output import new_console, print_pairs, print_table, progress_bar
 from mushrooms.store.summary import expected_collisions
 from scene import BadInput, Scene
 from scene.load import catalogue_text, read_data
@@ -37,7 +37,7 @@ def print_scenes(name: str, as_toml: bool, as_json: bool) -> None:
         )
         notes = f"Refused: {row['refused']}" if row["refused"] else row["notes"]
         table.add_row(row["name"], row["table"], length, notes)
-    new_console().print(table)
+    print_table(new_console(), table)
 
 
 def _toml(data: dict[str, Any]) -> str:

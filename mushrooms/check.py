@@ -2,6 +2,7 @@
 
 import secrets
 import shlex
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -133,7 +134,8 @@ def show(run: Run) -> None:
     seen = [verdict for verdict in VERDICTS if verdict == "pass" or groups[-1].counts[verdict]]
     verdicts = [Column(verdict, style=COLOURS.get(verdict, "bold red"), justify="right") for verdict in seen]
     numbers = [Column(name, justify="right") for name in ("worst ulps", "A/B/C", "class")]
-    table = Table("group", Column("cases", justify="right"), *verdicts, *numbers, title=_title(run))
+    heads = [Column("group", no_wrap=True), Column("cases", justify="right"), *verdicts, *numbers]
+    table = Table(*heads, title=_title(run))
     for group in groups:
         counts = [str(group.counts[verdict]) for verdict in seen]
         graded = ["–", "–"]
@@ -220,7 +222,7 @@ def write_questions(path: Path, level: str, seed: int | None) -> None:
     seed = secrets.randbelow(NEW_SEEDS) if seed is None else seed
     if path.suffix == ".jsonl":
         check_file(path, (".jsonl",))
-        sheet = Sheet(level, seed)
+        sheet = _draw_sheet(level, seed)
         n = write_lines(sheet, path)
     elif path.suffix:
         raise BadInput(f"--questions = {str(path)!r}, must end in .jsonl, or be a folder for CSV")
@@ -228,11 +230,17 @@ def write_questions(path: Path, level: str, seed: int | None) -> None:
         with writable_folder(path) as folder:
             if any(folder.iterdir()):
                 raise BadInput(f"--questions = {str(path)!r} is not empty, must be a new folder")
-            sheet = Sheet(level, seed)
+            sheet = _draw_sheet(level, seed)
             n = write_tables(sheet, folder)
     more = f", {len(sheet.questions) - n} left out that CSV cannot hold" if n < len(sheet.questions) else ""
     print(f"{n} questions of level {level} and seed {seed}{more}: {path}")
     print(f"Grade the answers with: mushrooms check --questions {path} --answers FILE")
+
+
+def _draw_sheet(level: str, seed: int) -> Sheet:
+    """Return the questions of a run, and say that they take a while: many are proved anew."""
+    print(f"drawing and proving the questions of seed {seed}: some 20 seconds", file=sys.stderr, flush=True)
+    return Sheet(level, seed)
 
 
 def grade_file(answers: Path, questions: Path | None, level: str, seed: int | None) -> Run:

@@ -12,7 +12,7 @@ from conformance.audit.runs import is_scene, scene_named
 from conformance.files import write_file
 from mushrooms import orbits
 from mushrooms.figures import energies, orbits as pictures, style, table as tables
-from mushrooms.output import announce_compilation, check_file, progress_bar, refuse_unheeded
+from mushrooms.output import Watch, announce_compilation, check_file, progress_bar, refuse_unheeded
 from mushrooms.simulate import draw_energies
 from mushrooms.store.run import is_run, open_run
 from mushrooms.tables import SUFFIXES
@@ -63,14 +63,17 @@ class DrawOptions(NamedTuple):
         usual = usual_of(kind, scene, self.phase)
         n_cycles = self.cycles or (None if self.collisions else usual.n_cycles)
         n_collisions = self.collisions or (None if n_cycles else usual.n_collisions)
-        return orbits.follow(
-            scene,
-            n_collisions or orbits.MAX_COLLISIONS,
-            energy=self.energy or orbits.usual_energy(scene, usual.crossings),
-            seed=self.seed or 0,
-            n_orbits=n_orbits or self.particles or usual.n_orbits,
-            n_cycles=n_cycles,
-        )
+        n = n_orbits or self.particles or usual.n_orbits
+        with progress_bar() as bar:
+            return orbits.follow(
+                scene,
+                n_collisions or orbits.MAX_COLLISIONS,
+                energy=self.energy or orbits.usual_energy(scene, usual.crossings),
+                seed=self.seed or 0,
+                n_orbits=n,
+                n_cycles=n_cycles,
+                progress=partial(Watch(bar, "particles", "particles").update, n_total=n),
+            )
 
 
 def usual_of(kind: str, scene: Scene, phase: float | None) -> Usual:
@@ -147,9 +150,12 @@ def _paths(scene: Scene, out: Path, kinds: list[str]) -> dict[str, Path]:
 def _draw(kind: str, suffix: str, scene: Scene, options: DrawOptions, file: BinaryIO) -> None:
     """Draw one kind of picture into an open file."""
     if kind == "walls":
-        tables.write_picture(scene, suffix, file)
+        with progress_bar() as bar:
+            tables.write_picture(scene, suffix, file, Watch(bar, "GIF", "frames").update)
     elif kind == "trajectory" and suffix == ".gif":
-        pictures.write_animation(options.follow(scene, kind, 1)[0], file)
+        [orbit] = options.follow(scene, kind, 1)
+        with progress_bar() as bar:
+            pictures.write_animation(orbit, file, progress=Watch(bar, "GIF", "frames").update)
     elif kind == "growth" and options.particles != 1:
         style.save(_growth(scene, options), file, suffix)
     else:
@@ -178,6 +184,14 @@ def _growth(scene: Scene, options: DrawOptions) -> Figure:
     usual = PICTURES["growth"]
     energy = options.energy or orbits.usual_energy(scene, usual.crossings)
     n, n_cycles = options.particles or usual.n_orbits, options.cycles or usual.n_cycles or 1
-    found = fast.simulate(scene, n_particles=n, energy=energy, n_cycles=n_cycles, seed=options.seed or 0)
+    with progress_bar() as bar:
+        found = fast.simulate(
+            scene,
+            n_particles=n,
+            energy=energy,
+            n_cycles=n_cycles,
+            seed=options.seed or 0,
+            progress=partial(Watch(bar, "particles", "particles").update, n_total=n),
+        )
     gains = np.log(found.cycle_energies[found.takes_part()] / energy)
     return energies.growth(scene, energy, gains, n)

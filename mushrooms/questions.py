@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 import fast
 import reference
@@ -152,7 +152,7 @@ def _row(tally: Any) -> dict[str, Any]:
 
 def _print(tallies: list[Any]) -> None:
     heads = ("cases", "agreed", "undecided", "refused", "open", "wrong", "worst ulps", "slowest s")
-    table = Table("family", *heads, title="Attacks: verdicts of all steppers asked")
+    table = Table(Column("family", no_wrap=True), *heads, title="Attacks: verdicts of all steppers asked")
     for tally in tallies:
         counts = [str(count) for count in tally.counts.values()]
         table.add_row(
@@ -192,15 +192,19 @@ def verify_file(file: Path, scene: str | None, picture: Path | None) -> int:
 
 
 def _of_rows(file: Path, label: str, scene: str) -> dict[str, Any]:
-    """Return a CSV file as the verifier takes a trajectory."""
-    states = []
+    """Return a CSV file as the verifier takes a trajectory; each row but the first names the wall it hit."""
+    of = scene_named(scene)
     check_digest(file, label)
-    for place, row in read_rows(file, label, FIELDS):
+    states: list[dict[str, Any]] = []
+    for place, row in read_rows(file, label, (*FIELDS, "wall")):
         numbers = {name: read_number(place, name, row[name]) for name in FIELDS}
-        states.append({**numbers, "wall": row.get("wall") or None})
+        if states and row["wall"] not in of.walls:
+            given = shown(row["wall"]) if row["wall"] else "empty"
+            raise BadInput(f"{place}: wall is {given}, must be the wall that was hit: {', '.join(of.walls)}")
+        states.append({**numbers, "wall": row["wall"] or None})
     if not states:
         raise BadInput(f"{label}: there is no row")
-    return {"scene": wire_form(scene_named(scene)), "state": states[0], "steps": states[1:]}
+    return {"scene": wire_form(of), "state": states[0], "steps": states[1:]}
 
 
 def _draw(data: dict[str, Any], at: int) -> bytes:

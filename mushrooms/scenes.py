@@ -5,7 +5,7 @@ import math
 import sys
 from typing import Any
 
-from rich.table import Table
+from rich.table import Column, Table
 
 import scene as scenes
 import theory
@@ -30,7 +30,7 @@ def print_scenes(name: str, as_toml: bool, as_json: bool) -> None:
     if as_json:
         print(json.dumps(rows or of_audit or read_data(name), indent=2, ensure_ascii=False))
         return
-    table = Table("name", "table", "period", "notes", title="Catalogue")
+    table = Table(Column("name", no_wrap=True), "table", "period", "notes", title="Catalogue")
     for row in rows:
         length = (
             "refused" if row["refused"] else "static" if row["period"] is None else f"{row['period']:.6g}"

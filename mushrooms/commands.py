@@ -287,7 +287,7 @@ def export(
 
     The run is read block by block and its checksums are tested. A damaged run is refused.
     """
-    from mushrooms.store.run import export_run
+    from mushrooms.store.export import export_run
 
     export_run(run, to)
 

@@ -3,10 +3,13 @@
 Bad input of any kind is one line on stderr and exit code 2.
 """
 
+import codecs
 import errno
 import io
 import os
+import re
 import sys
+import warnings
 from concurrent.futures import BrokenExecutor
 from contextlib import suppress
 from itertools import pairwise
@@ -27,15 +30,29 @@ ENDS: dict[type[Exception], str] = {
     MemoryError: "not enough memory",
     RecursionError: "nested too deeply",
 }
+# Libraries that read the environment when they are imported, and how the names of their variables begin.
+CONFIGURED_BY = {
+    "numba": "NUMBA_",
+    "llvmlite": "LLVMLITE_",
+    "matplotlib": "MPL",
+    "numpy": "NPY_",
+    "zarr": "ZARR_",
+}
+AS_GIVEN = "mushrooms.as_given"  # what to do with a letter that cannot be encoded
+QUOTED = re.compile(r"'(?:[^'\\]|\\.)*'")
+LOST_BYTE = re.compile(r"\\udc([89a-f][0-9a-f])")
 
 
 def call(given: list[str], listener: Listener) -> int:
     """Run a command; return the exit code, and tell the listener that the command has ended."""
     _make_printable()
+    format_before = warnings.formatwarning
+    warnings.formatwarning = _format_warning  # type: ignore[assignment]  # it needs no place
     try:
         code = _end_of(given, listener)
         listener.end(code)
     finally:
+        warnings.formatwarning = format_before
         for stream in (sys.stdout, sys.stderr):
             _let_go(stream)
     return code
@@ -87,7 +104,27 @@ def _refuse(error: BaseException) -> int:
 
     if isinstance(error, BadInput):
         return _tell(REFUSED, str(error))
+    if variables := _variables_behind(error):
+        return _tell(REFUSED, f"environment variable {' or '.join(variables)}: {error}")
     raise error
+
+
+def _variables_behind(error: BaseException) -> list[str]:
+    """Return the variables that configure a library, with their values, if it fails while it is imported."""
+    is_import, last, at = False, "", error.__traceback__
+    while at is not None:
+        is_import = is_import or at.tb_frame.f_globals.get("__name__") == "importlib._bootstrap"
+        last = str(at.tb_frame.f_globals.get("__name__")).partition(".")[0]
+        at = at.tb_next
+    prefix = CONFIGURED_BY.get(last)
+    if prefix is None or not is_import:
+        return []
+    return [f"{name} = {value!r}" for name, value in sorted(os.environ.items()) if name.startswith(prefix)]
+
+
+def _format_warning(message: Warning | str, *_place: object) -> str:
+    """Return a warning of a library in one line, the first of it."""
+    return f"{PROGRAM}: warning: {str(message).strip().partition(chr(10))[0]}\n"
 
 
 def _refuse_empty(given: list[str]) -> None:
@@ -104,7 +141,7 @@ def _tell(code: int, message: str, error: BaseException | None = None) -> int:
     """Say on stderr in one line how a command ends, with the notes of the error; return the exit code."""
     text = "; ".join([message, *getattr(error, "__notes__", [])])
     with suppress(OSError):  # standard error may be full, or its terminal gone: the exit code still tells
-        print(f"{PROGRAM}: {' '.join(text.split())}", file=sys.stderr, flush=True)
+        print(f"{PROGRAM}: {_quote_for_shells(' '.join(text.split()))}", file=sys.stderr, flush=True)
     return code
 
 
@@ -126,8 +163,30 @@ def _make_printable() -> None:
         if getattr(sys, name) is None:
             mode = "r" if name == "stdin" else "w"
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 (till the end)
-    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors in ("strict", "surrogateescape"):
-        sys.stdout.reconfigure(errors="backslashreplace")
+    codecs.register_error(AS_GIVEN, _encode_as_given)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors=AS_GIVEN)
+
+
+def _encode_as_given(error: UnicodeError) -> tuple[bytes | str, int]:
+    """Print a byte of a path that is no letter as the byte it is; another letter that lacks by its number."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    letter = error.object[error.start]
+    if "\udc80" <= letter <= "\udcff":
+        return bytes([ord(letter) - 0xDC00]), error.start + 1
+    return letter.encode("ascii", "backslashreplace").decode(), error.start + 1
+
+
+def _quote_for_shells(text: str) -> str:
+    """Write quoted paths that hold bytes which are no letters as shells read them, begun by a dollar sign."""
+
+    def quote(found: re.Match[str]) -> str:
+        word = LOST_BYTE.sub(r"\\x\1", found[0])
+        return word if word == found[0] else f"${word}"
+
+    return QUOTED.sub(quote, text)
 
 
 def _let_go(stream: IO[str]) -> None:

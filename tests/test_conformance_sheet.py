@@ -193,6 +193,12 @@ BAD_ANSWERS = {
     "bad hex": ("a.csv", HEADER + ROW.replace("1,1\n", "1,0xzz\n"), "vy = '0xzz', must be a finite number"),
     "seq no whole": ("a.csv", HEADER + ROW.replace("1,coll", "1.5,coll"), "seq = '1.5', must be a whole"),
     "torn": ("a.csv", HEADER + ROW + ROW.replace("1,coll", "2,coll") + ROW, "seq = 1 is answered twice"),
+    "semicolons": (
+        "a.csv",
+        HEADER.replace(",", ";"),
+        "columns are separated by semicolons, must be by commas",
+    ),
+    "tabs": ("a.csv", HEADER.replace(",", "\t"), "columns are separated by tabs"),
     "no utf-8": ("a.csv", b"\xff\xfe", "it is no UTF-8"),
     "no file": ("missing.jsonl", None, "No such file"),
 }
@@ -209,7 +215,7 @@ def test_bad_answers_are_refused_in_one_line(name, tmp_path, command_line):
 def test_the_command_writes_questions_and_grades_answers(tmp_path, command_line):
     questions, answers = tmp_path / "q.jsonl", tmp_path / "a.jsonl"
     code, out, err = command_line("check", "--questions", questions, "--seed", 7)
-    assert (code, err) == (0, "")
+    assert (code, err) == (0, "drawing and proving the questions of seed 7: some 20 seconds\n")
     answers.write_bytes(answered(questions.read_bytes()))
     for options in (("--questions", questions), ()):
         code, out, err = command_line("check", *options, "--answers", answers)

@@ -303,13 +303,16 @@ def exponents(
 
 
 @rc_context(plots.STYLE)
-def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAMES) -> None:
+def write_animation(
+    orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAMES, progress: tables.Progress | None = None
+) -> None:
     """Write a GIF of the walls in motion and the particle with its last flights behind it.
 
     Args:
         orbit: shown from its start to its last collision, at frames evenly spaced in time.
         file: open for binary writing.
         n_frames: number of frames.
+        progress: called with the number of frames that are drawn, and with that of all.
     """
     [orbit] = _check_orbits(orbit)
     states = orbit.states()
@@ -327,4 +330,4 @@ def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAM
         dot.set_data(*places[k : k + 1].T)
         axes.set_title(f"{plots.plain(orbit.scene.name)}   {name} = {(times[k] - times[0]) / unit:.2f}")
 
-    tables.write_frames(orbit.scene, axes, times.tolist(), show, file)
+    tables.write_frames(orbit.scene, axes, times.tolist(), show, file, progress)

@@ -100,7 +100,7 @@ DESCRIPTIONS = {
 }
 WAYS = (flipped, torn, emptied, "removed", "another")
 CASES = [(name, how) for name in (*NUMBERS, *DESCRIPTIONS) for how in WAYS]
-QUICK = [case for i, case in enumerate(CASES) if i % 3 == 0]
+QUICK = [case for i, case in enumerate(CASES) if i % 3 == 0 or case[1] == "another"]
 
 
 def of_dataset(_folder):

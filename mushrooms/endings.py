@@ -39,7 +39,7 @@ CONFIGURED_BY = {
     "zarr": "ZARR_",
 }
 AS_GIVEN = "mushrooms.as_given"  # what to do with a letter that cannot be encoded
-QUOTED = re.compile(r"'(?:[^'\\]|\\.)*'")
+QUOTED = re.compile(r"""'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*\"""")
 LOST_BYTE = re.compile(r"\\udc([89a-f][0-9a-f])")
 
 
@@ -111,13 +111,15 @@ def _refuse(error: BaseException) -> int:
 
 def _variables_behind(error: BaseException) -> list[str]:
     """Return the variables that configure a library, with their values, if it fails while it is imported."""
-    is_import, last, at = False, "", error.__traceback__
+    being_imported = set[str]()
+    library, at = "", error.__traceback__
     while at is not None:
-        is_import = is_import or at.tb_frame.f_globals.get("__name__") == "importlib._bootstrap"
-        last = str(at.tb_frame.f_globals.get("__name__")).partition(".")[0]
+        library = str(at.tb_frame.f_globals.get("__name__")).partition(".")[0]
+        if at.tb_frame.f_code.co_name == "<module>":
+            being_imported.add(library)
         at = at.tb_next
-    prefix = CONFIGURED_BY.get(last)
-    if prefix is None or not is_import:
+    prefix = CONFIGURED_BY.get(library)
+    if prefix is None or library not in being_imported:
         return []
     return [f"{name} = {value!r}" for name, value in sorted(os.environ.items()) if name.startswith(prefix)]
 
@@ -183,8 +185,11 @@ def _quote_for_shells(text: str) -> str:
     """Write quoted paths that hold bytes which are no letters as shells read them, begun by a dollar sign."""
 
     def quote(found: re.Match[str]) -> str:
-        word = LOST_BYTE.sub(r"\\x\1", found[0])
-        return word if word == found[0] else f"${word}"
+        word = found[0][1:-1]
+        if LOST_BYTE.search(word) is None:
+            return found[0]
+        inside = word.replace("'", r"\'") if found[0].startswith('"') else word
+        return "$'" + LOST_BYTE.sub(r"\\x\1", inside) + "'"
 
     return QUOTED.sub(quote, text)
 

@@ -5,7 +5,7 @@ a bare `except`, the exception is thrown away and the command goes on. So an `In
 is raised again a moment later, until it reaches the place that ends the command.
 
 SIGTERM and SIGHUP do what SIGINT does: a batch system ends its jobs so. A signal that is ignored from the
-start (`nohup`) stays ignored. The signal itself ends no system call of another thread.
+start (`nohup`) stays ignored.
 
 This module is imported before anything else is: it imports only what the interpreter has soon.
 """

@@ -308,7 +308,8 @@ def test_the_command_draws_several_pictures_and_exports(command_line, tmp_path, 
     )  # fmt: skip
     assert code == 0
     assert out.split() == ["orbit.csv", "orbits-section.png", "orbits-map.png"]
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(out.split())
+    written = {path.name for path in tmp_path.iterdir()}
+    assert written == {*out.split(), "orbit.csv-metadata.json"}
     assert len((tmp_path / "orbit.csv").read_text().splitlines()) == 102
 
 

@@ -183,7 +183,7 @@ def test_every_command_has_an_example(command_line, name):
 
 
 def test_a_file_that_the_system_refuses_is_named_without_a_number(command_line, tmp_path, monkeypatch):
-    def full(_table, _suffix, file):
+    def full(_table, _suffix, file, _progress):
         raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
 
     monkeypatch.setattr(table, "write_picture", full)
@@ -316,7 +316,7 @@ def test_whatever_ends_a_command_no_half_written_file_stays(tmp_path, name, is_f
         from mushrooms.figures import table
         from mushrooms.main import run
 
-        def ended(_table, _suffix, file):
+        def ended(_table, _suffix, file, _progress):
             file.write(b"half")
             os.kill(os.getpid(), signal.{name})
 

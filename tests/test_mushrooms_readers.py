@@ -29,6 +29,12 @@ ENERGY, SEED, N, BLOCK = 1e4, 3, 60, 20
 MAKE = ["simulate", "moving-cap", "--energy", ENERGY, "--seed", SEED, "--particles", N, "--block", BLOCK]
 
 
+def call(words):
+    with pytest.raises(SystemExit) as stop:
+        run(list(map(str, words)))
+    assert stop.value.code == 0
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """Return a folder with a finished run and the tables that were exported from it."""
@@ -39,8 +45,7 @@ def written(tmp_path_factory):
     ]
     with contextlib.chdir(folder):
         for words in lines:
-            with pytest.raises(SystemExit, match="0"):
-                run(list(map(str, words)))
+            call(words)
     return folder
 
 
@@ -95,7 +100,7 @@ DESCRIPTIONS = {
 }
 WAYS = (flipped, torn, emptied, "removed", "another")
 CASES = [(name, how) for name in (*NUMBERS, *DESCRIPTIONS) for how in WAYS]
-QUICK = [case for i, case in enumerate(CASES) if i % 3 == 0]
+QUICK = [case for i, case in enumerate(CASES) if i % 3 == 0 or case[1] == "another"]
 
 
 def of_dataset(_folder):
@@ -171,8 +176,7 @@ def test_no_reader_takes_a_damaged_run_for_a_whole_one(here, tmp_path, truth, ca
     refused = [is_refused(name, reader, tmp_path, truth) for name, reader in READERS.items()]
     assert path in DESCRIPTIONS or all(refused)
     if any(refused):  # the run goes on to the same bits
-        with pytest.raises(SystemExit, match="0"):
-            run([*map(str, MAKE), "--out", "run", "--resume"])
+        call([*MAKE, "--out", "run", "--resume"])
     assert np.array_equal(open_run(Path("run")).ensemble(N).energy, truth)
 
 

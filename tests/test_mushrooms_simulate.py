@@ -487,21 +487,24 @@ def test_exports_have_every_bit(command_line, stored, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "words"),
+    ("name", "content", "words"),
     [
-        (f"{GROUP}/cycle_energies/c/2/0", ["missing or damaged"]),
-        (f"{MARKERS}/1.marker", [f"has {N - 64} of {N} particles", "--resume"]),
+        (f"{GROUP}/cycle_energies/c/2/0", b"", ["missing or damaged"]),
+        (f"{MARKERS}/1.marker", b"", ["block 1 of", "missing or damaged"]),
+        (f"{MARKERS}/1.marker", None, [f"has {N - 64} of {N} particles", "--resume"]),
     ],
 )
 @pytest.mark.parametrize(
     "to", deep_but(["run.csv", "run.parquet", "run.npz", "run.svg"], "run.parquet", "run.svg")
 )
 def test_a_damaged_or_unfinished_run_is_neither_exported_nor_drawn(
-    command_line, stored, tmp_path, name, words, to
+    command_line, stored, tmp_path, name, content, words, to
 ):
     """What pyarrow had begun to write closed itself when nobody held it any more, with a page on stderr."""
     folder, unraised = shutil.copytree(stored, tmp_path / "run"), []
-    (folder / name).write_bytes(b"")
+    (folder / name).unlink()
+    if content is not None:
+        (folder / name).write_bytes(content)
     command = ["draw", folder, "--out"] if to == "run.svg" else ["export", folder, "--to"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "unraisablehook", unraised.append)

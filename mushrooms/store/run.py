@@ -350,8 +350,9 @@ def attributes_of(folder: Path) -> dict[str, Any]:
         BadInput: the folder holds no run, or both are damaged.
     """
     content = unsealed(folder / MARKERS / DESCRIPTION)
-    if content is not None:
-        return dict(json.loads(content))
+    described = {} if content is None else dict(json.loads(content))
+    if "schema" in described:  # else it is another sealed file, in the wrong place
+        return described
     with suppress(*UNREADABLE):
         found = dict(zarr.open_group(folder / GROUP, mode="r").attrs)
         if found.pop("seal", None) == _digest(found):

@@ -370,11 +370,15 @@ def _parquet(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
     arrow, parquet = import_arrow()
     try:
         with parquet.ParquetFile(path) as file:
-            wanted = _select_columns(label, file.schema_arrow.names)
+            names = file.schema_arrow.names
+            wanted = _select_columns(label, names)
+            twice = next((name for name in wanted if names.count(name) > 1), None)
+            if twice is not None:
+                raise BadInput(f"{label}: column {twice!r} stands twice")
             for batch in file.iter_batches(PART, columns=wanted):
                 columns = ((name, batch.column(name).cast("float64")) for name in wanted)
                 yield {name: column.to_numpy(zero_copy_only=False) for name, column in columns}
-    except (arrow.ArrowInvalid, arrow.ArrowNotImplementedError, KeyError) as error:  # a name that comes twice
+    except (arrow.ArrowInvalid, arrow.ArrowNotImplementedError, KeyError) as error:
         raise BadInput(f"{label}: {error}") from None
 
 

@@ -16,12 +16,14 @@ from typing import IO, Any, NoReturn
 
 import typer
 
+from mushrooms import environment
 from mushrooms.commands import app
 
 PROGRAM = "mushrooms"
 # Typer 0.26 carries a click of its own, older ones import it: this is the error class of the one in use.
 UsageError: type[Any] = typer.BadParameter.__bases__[0]
 REFUSED, INTERRUPTED = 2, 130
+HELP = {"--help", "--version"}  # they import no library that reads the environment
 # What ends a command through no fault of its input, in words.
 ENDS: dict[type[Exception], str] = {
     EOFError: "a file or stream ended too soon",
@@ -46,6 +48,8 @@ def _call(given: list[str]) -> NoReturn:
     try:
         _end_as_by_keyboard()
         _refuse_empty(given)
+        if not HELP.intersection(given):
+            _check_environment()
         try:
             with typer.main.get_command(app).make_context(PROGRAM, list(given)) as context:
                 code = context.command.invoke(context)
@@ -66,9 +70,10 @@ def _call(given: list[str]) -> NoReturn:
     except ValueError as error:
         from scene.refusal import BadInput  # not above: the list of commands needs no scene
 
-        if not isinstance(error, BadInput):
+        refused = str(error) if isinstance(error, BadInput) else environment.name_backend(error)
+        if refused is None:
             raise
-        code = _tell(REFUSED, str(error))
+        code = _tell(REFUSED, refused)
     except (ImportError, SystemError) as error:
         # A compiled module that is loaded when an interrupt comes says that it failed.
         cause: BaseException | None = error
@@ -99,6 +104,13 @@ def _refuse_empty(given: list[str]) -> None:
         if not word.strip() or (word.startswith("--") and word.endswith("=")):
             name = next((option for option in (word, before) if option.startswith("--")), "an argument")
             raise UsageError(f"{name.rstrip('=')} is empty, must have a value")
+
+
+def _check_environment() -> None:
+    """Refuse a variable of the environment before a library that reads it is imported."""
+    what = environment.bad_variable()
+    if what is not None:
+        raise UsageError(what)
 
 
 def _tell(code: int, message: str, error: BaseException | None = None) -> int:

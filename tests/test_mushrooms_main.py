@@ -171,6 +171,34 @@ def test_no_help_imports_what_takes_long():
     assert "numba" in loaded_by("import fast\nfast.simulate")
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "bound"),
+    [
+        ("NUMBA_NUM_THREADS", "0", ">= 1"),
+        ("NUMBA_NUM_THREADS", "many", ">= 1"),
+        ("SOURCE_DATE_EPOCH", "-1", ">= 0"),
+        ("SOURCE_DATE_EPOCH", "", ">= 0"),
+    ],
+)
+def test_a_variable_that_no_library_can_use_is_refused(command_line, monkeypatch, name, value, bound):
+    monkeypatch.setenv(name, value)
+    line = f"{name} = {value!r}, must be a whole number {bound}"
+    assert_refused(command_line("theory", "moving-cap"), line)
+    assert command_line("--help").code == 0
+
+
+def test_a_backend_that_does_not_exist_is_refused(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "mushrooms", "draw", "moving-cap", "--out", "a.svg"],
+        cwd=tmp_path,
+        env={**BUFFERED, "PYTHONPATH": str(ROOT), "MPLBACKEND": "bogus"},
+        capture_output=True,
+        text=True,
+    )
+    assert_refused((done.returncode, done.stdout, done.stderr), "MPLBACKEND = 'bogus'", "agg")
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("name", ["", *COMMANDS])
 def test_every_command_has_an_example(command_line, name):
     code, out, _ = command_line(*name.split(), "--help")

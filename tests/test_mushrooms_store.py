@@ -170,6 +170,18 @@ DAMAGES = [
 ]
 
 
+def test_a_table_of_too_many_columns_is_refused_before_it_is_begun(command_line, tmp_path, monkeypatch):
+    """A row of it would hold every cycle of a particle; arrays hold as many as there are."""
+    monkeypatch.chdir(tmp_path)
+    slow = ["simulate", "fermi-ulam", "--particles", 2, "--energy", 0.01, "--cycles", 11000, "--out", "long"]
+    assert command_line(*slow).code == 0
+    for to in ("long.csv", "long.parquet"):
+        ended = command_line("export", "long", "--to", to)
+        assert_refused(ended, "columns, must be at most 10000", ".npz", "xarray")
+        assert not Path(to).exists()
+    assert command_line("export", "long", "--to", "long.npz").code == 0
+
+
 @pytest.mark.parametrize("case", deep_but(DAMAGES, *DAMAGES[:4]))
 def test_a_damaged_file_is_mended_and_its_block_followed_again(command_line, finished, followed, whole, case):
     """Of one array's description nothing is followed again; that of the run is there twice."""

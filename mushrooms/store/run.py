@@ -46,6 +46,7 @@ from mushrooms.store.summary import RunTally, tally_of
 from scene import BadInput
 
 GROUP, MARKERS = "ensemble.zarr", "blocks"
+MAX_COLUMNS = 10_000  # of a table: programs that read tables take minutes over more
 DESCRIPTION = "run.marker"  # among the markers: the group's attributes once more, sealed
 # What zarr raises of damaged metadata and chunks.
 UNREADABLE = (ArithmeticError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
@@ -383,11 +384,22 @@ def write_npz(run: StoredRun, file: BinaryIO) -> None:
 
 
 def _tables(run: StoredRun) -> Iterator[Arrays]:
-    """Yield each block as columns by their names."""
+    """Yield each block as columns by their names.
+
+    Raises:
+        BadInput: they are too many for a program that reads tables.
+    """
+    names = [name for name in run.shape.names if name != LANES]
+    n_columns = sum(int(np.prod(run.shape.of(name, 1, run.spec.n_cycles))) for name in names)
+    if n_columns > MAX_COLUMNS:
+        raise BadInput(
+            f"a table of {n_columns} columns, must be at most {MAX_COLUMNS}: export to .npz, or read"
+            f" {GROUP} with xarray"
+        )
     for number in range(run.shape.n_blocks):
         first = number * run.shape.block
         table: Arrays = {"particle": np.arange(first, first + run.shape.rows(number))}
-        for name in [name for name in run.shape.names if name != LANES]:
+        for name in names:
             array = run.read(number, name)
             for place in product(*map(range, array.shape[1:])):
                 words = [WALLS[i] if FIELDS[name].dims[-1] == "wall" else str(i + 1) for i in place]

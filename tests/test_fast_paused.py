@@ -150,7 +150,7 @@ def test_another_run_is_refused(changes, words):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"n_particles": 3}, r"before: lanes has the shape \(1, 46\), must have \(3, 46\)"),
+        ({"n_particles": 3}, r"before: lanes has the shape \(1, (\d+)\), must have \(3, \1\)"),
         ({"energy": 11.0}, "before: energy = 10.0, must be 11.0"),
         ({"phases": (0.25, 0.5)}, r"before: ensemble.phase_energies has the shape \(1, 2, 1\)"),
         ({"phases": ()}, r"before: ensemble.phase_energies has the shape \(1, 2, 1\)"),

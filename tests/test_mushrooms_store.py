@@ -434,6 +434,16 @@ def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
     assert ("1 blocks (0)" in ended.err) == (n_written > 3)
 
 
+def test_a_run_may_be_lengthened_many_times_over_but_not_endlessly(command_line, tmp_path, monkeypatch):
+    """Each chunk of cycles is a file of every array."""
+    summary_of(command_line(*lengthened(tmp_path, 2)))
+    before = held(tmp_path)
+    monkeypatch.setattr(fast, "go_on", None)
+    words = "--cycles = 401, must be at most 400 for a run that began with 2"
+    assert_refused(command_line(*lengthened(tmp_path, 401)), words)
+    assert held(tmp_path) == before
+
+
 def test_a_chunk_holds_the_cycles_that_a_run_began_with_and_is_written_once(command_line, tmp_path):
     folder, written = tmp_path / "ensemble.zarr" / "cycle_energies" / "c" / "1", set()
     for cycles in (2, 5):

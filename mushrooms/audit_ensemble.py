@@ -384,12 +384,15 @@ def _parquet(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
     arrow, parquet = import_arrow()
     try:
         with parquet.ParquetFile(path, page_checksum_verification=True) as file:
-            wanted = _select_columns(label, file.schema_arrow.names)
+            names = file.schema_arrow.names
+            wanted = _select_columns(label, names)
+            twice = next((name for name in wanted if names.count(name) > 1), None)
+            if twice is not None:
+                raise BadInput(f"{label}: column {twice!r} stands twice")
             for batch in file.iter_batches(PART, columns=wanted):
                 columns = ((name, batch.column(name).cast("float64")) for name in wanted)
                 yield {name: column.to_numpy(zero_copy_only=False) for name, column in columns}
     except (arrow.ArrowException, LookupError, UnicodeError, OverflowError) as error:
-        # Damaged, or a name that comes twice.
         raise BadInput(f"{label} cannot be read: {error}") from None
 
 

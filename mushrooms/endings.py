@@ -17,12 +17,14 @@ from typing import IO, Any
 
 import typer
 
+from mushrooms import environment
 from mushrooms.commands import app
 from mushrooms.interrupts import INTERRUPTED, PROGRAM, Listener
 
 # Typer 0.26 carries a click of its own, older ones import it: this is the error class of the one in use.
 UsageError: type[Any] = typer.BadParameter.__bases__[0]
 REFUSED = 2
+HELP = {"--help", "--version"}  # they import no library that reads the environment
 # What ends a command through no fault of its input, in words.
 ENDS: dict[type[Exception], str] = {
     EOFError: "a file or stream ended too soon",
@@ -73,6 +75,8 @@ def _end_of(given: list[str], listener: Listener) -> int:
 def _invoke(given: list[str]) -> int:
     """Run a command, not by typer's `main`, which calls a file that ends too soon an interruption."""
     _refuse_empty(given)
+    if not HELP.intersection(given):
+        _check_environment()
     try:
         with typer.main.get_command(app).make_context(PROGRAM, list(given)) as context:
             code = context.command.invoke(context)
@@ -80,6 +84,13 @@ def _invoke(given: list[str]) -> int:
         code = stop.exit_code
     sys.stdout.flush()
     return code or 0
+
+
+def _check_environment() -> None:
+    """Refuse a variable of the environment before a library that reads it is imported."""
+    what = environment.bad_variable()
+    if what is not None:
+        raise UsageError(what)
 
 
 def _is_made_of_an_interrupt(error: BaseException | None) -> bool:

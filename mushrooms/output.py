@@ -22,11 +22,14 @@ from scene import BadInput
 FIRST, EVERY = 20.0, 60.0  # seconds to the first line, and between lines, where there is no terminal
 CLOCK = time.monotonic
 UNITS = ((1.0, "seconds"), (60.0, "minutes"), (3600.0, "hours"), (86400.0, "days"))
-# The compiled functions that a person waits for, and how long in all; the others take a few seconds.
+# The kernels of `fast.kernel` that take more than three seconds to compile, and how long a command waits in
+# all. `loop` is a step of the lanes.
 SLOW_TO_COMPILE = {
-    "careful_step": "about half a minute",
+    "scalar_step": "about half a minute",
+    "loop": "about half a minute",
     "follow_particles": "about half a minute",
-    "fine": "about ten seconds",
+    "follow_path": "about half a minute",
+    "fine_path": "about ten seconds",
 }
 
 
@@ -44,10 +47,13 @@ def announce_compilation() -> Iterator[None]:
         def on_start(self, compilation: Any) -> None:
             compiled = compilation.data["dispatcher"]
             duration = SLOW_TO_COMPILE.get(compiled.py_func.__name__)
-            if duration is not None and compiled.stats.cache_path and duration not in announced:
+            is_ours = compiled.py_func.__module__.startswith("fast.")
+            if is_ours and duration is not None and duration not in announced:
                 announced.add(duration)
                 what = f"compiling the fast stepper for this machine: {duration}"
-                print(f"{what}; kept for next time", file=sys.stderr, flush=True)
+                is_kept = bool(compiled.stats.cache_path)
+                next_time = "kept for next time" if is_kept else "no folder can be written in to keep it"
+                print(f"{what}; {next_time}", file=sys.stderr, flush=True)
 
         def on_end(self, compilation: Any) -> None:
             pass

@@ -228,6 +228,15 @@ def test_a_record_meets_its_published_schema_and_returns_whole():
         (record.encode(a_record(msgspec.structs.replace(a_point([1.0]), wrong=-1))), "wrong"),
         (record.encode(a_record(msgspec.structs.replace(a_point([1.0]), relative=(-1.0,)))), "relative"),
         (record.encode(msgspec.structs.replace(a_record(), format=1)), "format = 1, must be 3"),
+        (record.encode(a_record(a_point([1.0]), a_point([2.0]))), "'fast' on 'slow' stands twice"),
+        (
+            record.encode(a_record(msgspec.structs.replace(a_point([1.0]), workload="other"))),
+            "'fast' on 'other' is of a workload that it does not name",
+        ),
+        (
+            record.encode(msgspec.structs.replace(a_record(), workloads=DRAWN + DRAWN)),
+            "workload 'slow' stands twice",
+        ),
     ],
 )
 def test_a_file_that_is_no_record_is_refused(tmp_path, content, words):

@@ -6,6 +6,7 @@ Nothing false is certified. The corpus holds what it says, and no spoilt line ge
 import hashlib
 import json
 import os
+import shutil
 from fractions import Fraction
 from pathlib import Path
 
@@ -471,6 +472,7 @@ def replace(path, old, new):
     path.write_bytes(path.read_bytes().replace(old, new, 1))
 
 
+TWICE = "twice.jsonl"
 # What is done to the small corpus, and what `load` then says of it.
 SPOILT = {
     "changed number": (lambda at: replace(at / SECOND, b"0", b"1"), r"untilted.jsonl: sha256 = .*, must be"),
@@ -483,6 +485,10 @@ SPOILT = {
         r"digest = .*, must fit",
     ),
     "wrong count": (lambda at: write_manifest(at, {FIRST: 2}), r"moving-cap.jsonl: 3 vectors, must be 2"),
+    "a file twice": (
+        lambda at: write_manifest(Path(shutil.copy(at / FIRST, at / TWICE)).parent, {FIRST: 3, TWICE: 3}),
+        r"id moving-cap/1 appears twice, must be unique",
+    ),
 }
 
 

@@ -262,6 +262,15 @@ def test_the_runner_reads_every_line_or_says_wrong_format(tally):
     assert min(tally["wrong-format"], tally["pass"], tally["fail"]) > N_LINES / 20
 
 
+def test_a_hundred_names_are_kept_of_what_an_introduction_lists():
+    """A list without end would fill every report."""
+    lists = {name: [f"{name} {i}" for i in range(150)] for name in ("profiles", "tables", "laws")}
+    said = {"protocol": 1, "name": "a", "version": "1", "language": "C", **lists}
+    found = session.read_introduction(json.dumps(said).encode())
+    for name, given in lists.items():
+        assert getattr(found, name) == tuple(given[:100])
+
+
 def nonsense(draw, share):
     """Return what answers lines as the fast stepper does, but for a share of nonsense of the right seq."""
 

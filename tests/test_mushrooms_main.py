@@ -175,6 +175,22 @@ def test_no_help_imports_what_takes_long():
     assert "numba" in loaded_by("import fast\nfast.simulate")
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "bound"),
+    [
+        ("NUMBA_NUM_THREADS", "0", ">= 1"),
+        ("NUMBA_NUM_THREADS", "many", ">= 1"),
+        ("SOURCE_DATE_EPOCH", "-1", ">= 0"),
+        ("SOURCE_DATE_EPOCH", "", ">= 0"),
+    ],
+)
+def test_a_variable_that_no_library_can_use_is_refused(command_line, monkeypatch, name, value, bound):
+    monkeypatch.setenv(name, value)
+    line = f"{name} = {value!r}, must be a whole number {bound}"
+    assert_refused(command_line("theory", "moving-cap"), line)
+    assert command_line("--help").code == 0
+
+
 @pytest.mark.parametrize("name", ["", *COMMANDS])
 def test_every_command_has_an_example(command_line, name):
     code, out, _ = command_line(*name.split(), "--help")
@@ -250,8 +266,8 @@ def test_no_name_is_cut_where_the_terminal_is_narrow(monkeypatch, command_line, 
 
 # A variable of the environment that a library reads when it is imported, and words of the line that names it.
 VARIABLES = {
-    "NUMBA_NUM_THREADS=0": (2, "NUMBA_NUM_THREADS = '0'", "must be > 0"),
-    "NUMBA_NUM_THREADS=many": (0, "warning: Environment variable 'NUMBA_NUM_THREADS'", "many"),
+    "NUMBA_NUM_THREADS=0": (2, "NUMBA_NUM_THREADS = '0'", ">= 1"),
+    "NUMBA_OPT=many": (0, "warning: Environment variable 'NUMBA_OPT'", "many"),
     "MPLBACKEND=none-such": (2, "MPLBACKEND = 'none-such'", "not a valid value"),
 }
 

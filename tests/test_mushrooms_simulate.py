@@ -2,7 +2,6 @@
 
 import errno
 import gc
-import importlib.util
 import json
 import os
 import re
@@ -27,10 +26,9 @@ from support.refusals import assert_refused
 
 import fast
 import theory
-from conformance.audit import session
 from conformance.audit.runs import SCENES
 from fast.kernel.follow import LANE_ROWS
-from mushrooms import audit_ensemble, bench, orbits, output, questions
+from mushrooms import audit_ensemble, output
 from mushrooms.audit_ensemble import Options
 from mushrooms.main import run
 from mushrooms.output import LOCK, locked
@@ -48,57 +46,6 @@ from mushrooms.store.summary import (
 from scene import Fourier, Mushroom, load
 
 IN_MEMORY = ["simulate", "moving-cap", "--particles", 60, "--energy", 1e4, "--threads", 1, "--json"]
-KEPT = """\
-from numba import njit
-
-@njit(cache=True)
-def follow_particles(n):
-    return n + 1
-"""
-
-
-@pytest.fixture
-def fresh(tmp_path):
-    """Return what makes a compiled function anew, as a new process does; what is compiled is kept on disk."""
-    path = tmp_path / "kept.py"
-    path.write_text(KEPT)
-
-    def make():
-        spec = importlib.util.spec_from_file_location("kept", path)
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        return module.follow_particles
-
-    return make
-
-
-@pytest.mark.parametrize(
-    ("command", "owner", "name"),
-    [
-        (IN_MEMORY, fast, "simulate"),
-        (["audit", "--out"], session, "conduct"),
-        (["bench", "--quick", "--out"], bench, "_measure"),
-        (["attack", "--cases", 1, "--json"], questions, "run"),
-        (["draw", "ergodic", "--trajectory"], orbits, "follow"),
-    ],
-)
-def test_commands_that_compile_say_so_and_only_then(
-    command_line, capsys, fresh, monkeypatch, tmp_path, command, owner, name
-):
-    """The second process finds what the first has kept."""
-
-    def compiles(*_args, **_options):
-        fresh()(1)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(owner, name, compiles)
-    out = [tmp_path / "out.json"] if command[-1] in ("--out", "--json") and command is not IN_MEMORY else []
-    line = "compiling the fast stepper for this machine: about half a minute; kept for next time\n"
-    for n_lines in (1, 0):
-        code, _, err = command_line(*command, *out)
-        assert (code, err.count("\n"), err.count(line)) == (130, 1 + n_lines, n_lines)
-    assert fresh()(1.5) == 2.5  # another type of argument: compiled, but nobody is told outside
-    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,8 @@
 
 A volume is 2 pi times an area, weighted by the share of directions; at energy E it is
 sqrt(2 E) times larger. Every formula takes the number system first: `mpmath.fp` for floats,
-an `MPContext` for many digits, `numpy` for arrays. Intervals are not handled.
+an `MPContext` for many digits, `numpy` for arrays. Intervals are not handled. A `Volumes` may be copied and
+pickled to the last digit. A single number of your own `MPContext` may not: mpmath rounds its copies.
 
 Invariants and rates of energy follow from them.
 """

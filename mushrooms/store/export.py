@@ -23,6 +23,7 @@ from mushrooms.store.spec import FIELDS, LANES, WALLS, Arrays
 from mushrooms.tables import write_table
 from scene import BadInput
 
+MAX_COLUMNS = 10_000  # of a table: programs that read tables take minutes over more
 OF_THE_STORE = ("schema", "block", "cycles_of_a_chunk")  # attributes that say nothing of a table
 
 
@@ -97,12 +98,23 @@ def _write_npz(run: StoredRun, about: dict[str, Any], file: BinaryIO) -> None:
 
 
 def _tables(run: StoredRun, watch: Watch) -> Iterator[Arrays]:
-    """Yield each block as columns by their names."""
+    """Yield each block as columns by their names.
+
+    Raises:
+        BadInput: they are too many for a program that reads tables.
+    """
+    names = [name for name in run.shape.names if name != LANES]
+    n_columns = sum(int(np.prod(run.shape.of(name, 1, run.spec.n_cycles))) for name in names)
+    if n_columns > MAX_COLUMNS:
+        raise BadInput(
+            f"a table of {n_columns} columns, must be at most {MAX_COLUMNS}: export to .npz, or read"
+            f" {GROUP} with xarray"
+        )
     for number in range(run.shape.n_blocks):
         first = number * run.shape.block
         watch.update(first, run.shape.n_particles)
         table: Arrays = {"particle": np.arange(first, first + run.shape.rows(number))}
-        for name in [name for name in run.shape.names if name != LANES]:
+        for name in names:
             array = run.read(number, name)
             for place in product(*map(range, array.shape[1:])):
                 words = [WALLS[i] if FIELDS[name].dims[-1] == "wall" else str(i + 1) for i in place]

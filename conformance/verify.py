@@ -1327,8 +1327,9 @@ def require_listed(others: Sequence[Any], permitted: Sequence[Any]) -> None:
         all(other in permitted for other in others),
         Contradicted("no rule permits a further answer"),
     )
-    is_listed = all(others.count(answer) == 1 for answer in permitted)
-    require(is_listed, Contradicted("each further answer that is permitted must be listed, once"))
+    for answer in permitted:
+        why = f"{answer['outcome']} is permitted, too, and must be listed once"
+        require(others.count(answer) == 1, Contradicted(why))
 
 
 def is_extreme(scene: Scene, state: State, bits: int) -> bool:

@@ -1262,7 +1262,7 @@ def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
         Contradicted: its claim is false.
         Unproved: its claim is open.
     """
-    first, others = read_answers(record)
+    first, others = claim_of(record)
     state, steps = take(record, "state", dict), take({"steps": [], **first}, "steps", list)
     kind, count = take(record, "kind", str), record.get("collisions", 1)
     is_kind = kind in ("step", "trajectory", "flow") and type(count) is int and 0 < count < 10**6
@@ -1305,7 +1305,7 @@ def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
     require_listed(others, allowed)
 
 
-def read_answers(record: Any) -> tuple[Any, list[Any]]:
+def claim_of(record: Any) -> tuple[Any, list[Any]]:
     """Return the answer of a line that is to be proved, which does more than refuse if one does.
 
     Returns:
@@ -1327,8 +1327,9 @@ def require_listed(others: Sequence[Any], permitted: Sequence[Any]) -> None:
         all(other in permitted for other in others),
         Contradicted("no rule permits a further answer"),
     )
-    is_listed = all(others.count(answer) == 1 for answer in permitted)
-    require(is_listed, Contradicted("each further answer that is permitted must be listed, once"))
+    for answer in permitted:
+        why = f"{answer['outcome']} is permitted, too, and must be listed once"
+        require(others.count(answer) == 1, Contradicted(why))
 
 
 def is_extreme(scene: Scene, state: State, bits: int) -> bool:

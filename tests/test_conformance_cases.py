@@ -242,7 +242,8 @@ def rounding_step(scene, state, t_end):
 def test_a_path_ends_before_rounding_leads_elsewhere(index):
     """A wall crosses the table between two neighbours in binary64: no derivative says so."""
     vector = certify(FAMILIES["knot-at-event"].question(f"k/{index}"), 1)
-    (known,) = vector.expect
+    known, *further = vector.expect
+    assert {one.outcome for one in further} <= {"rejected"}  # late, it may be refused
     path = plain.trajectory(
         from_data(vector.scene), vector.state, len(known.steps), vector.t_end, rounding_step
     )

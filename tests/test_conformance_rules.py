@@ -7,6 +7,7 @@ faulty reader of each kind shows that a disagreement is seen.
 
 import json
 import math
+import subprocess
 from fractions import Fraction
 from functools import cache, partial
 from types import ModuleType
@@ -25,6 +26,7 @@ from conformance.cases.certify import claimed_path, with_further
 from conformance.cases.rule_scenes import DRAWS, RuleCase
 from conformance.cases.rules import sample
 from conformance.grading import agreement
+from conformance.harness.examples import find_examples, find_kit_examples
 from conformance.harness.python.stepper import timed
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import outcomes_of, read_answer
@@ -468,6 +470,42 @@ def test_steppers_decide_what_arrives():
     for name, server in STEPPERS.items():
         told = [outcomes(server, sample("time-left", key, False).text()) for key in range(60)]
         assert told.count(["horizon"]) > 40, (name, told)
+
+
+@pytest.fixture(scope="module")
+def examples(tmp_path_factory):
+    """Start the examples and the kit's engine that can be built here, by language."""
+    folder = tmp_path_factory.mktemp("examples")
+    found = find_examples(folder) | find_kit_examples(folder)
+    started = {}
+    for language in ("C", "JavaScript", "C++, next hit"):
+        if found[language].command:
+            command = found[language].command
+            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+            started[language] = found[language], subprocess.Popen(command, **pipes)
+        else:
+            started[language] = found[language], None
+    yield started
+    for _, process in started.values():
+        if process is not None:
+            process.kill()
+            process.communicate()
+
+
+@pytest.mark.parametrize("language", ["C", "JavaScript", "C++, next hit"])
+def test_an_example_knows_the_rules(language, examples):
+    example, process = examples[language]
+    if process is None:
+        assert example.is_absent, example.why_not
+        pytest.skip(example.why_not)
+
+    def exchange(lines):
+        process.stdin.write(b"".join(lines))
+        process.stdin.flush()
+        return process.stdout.readline()
+
+    for rule in ASKED:
+        assert not differs_in_stepper(rule, exchange), rule.name
 
 
 def old_end(scene: Any, state: State, t_end: float) -> Any:

@@ -153,13 +153,15 @@ def draw_transform(vector: Vector, seed: int) -> Transform:
     is_mirrored = own.pick((False, True))
     exponents = [k for k in range(-LARGEST, LARGEST + 1) if k]
     length, time = shared.pick(exponents), shared.pick(exponents)
-    if readable(vector.scene) is None or not _stays_in_range(vector, length, time):
+    if readable(vector.scene) is None:
         return Transform(is_mirrored)
-    image = Transform(is_mirrored, length, time)
     # Lateness counts units of time where nothing moves: no question may become one that may be refused.
-    return (
-        image if _may_be_refused(image.apply(vector)) == _may_be_refused(vector) else Transform(is_mirrored)
-    )
+    for image in (Transform(is_mirrored, length, time), Transform(is_mirrored, length)):
+        if not _stays_in_range(vector, image.length, image.time):
+            continue
+        if _may_be_refused(image.apply(vector)) == _may_be_refused(vector):
+            return image
+    return Transform(is_mirrored)
 
 
 def _may_be_refused(vector: Vector) -> bool:

@@ -19,6 +19,7 @@ from collections.abc import Mapping, Set
 from enum import Enum
 from fractions import Fraction
 from math import log2
+from textwrap import fill
 from typing import Any, Literal, NamedTuple
 
 import msgspec
@@ -42,13 +43,10 @@ Part = Literal["scene", "law", "state", "request", "answer"]
 
 
 class Duty(Enum):
-    """What is answered where a rule is broken; the value is what the page says.
-
-    A question with a field that may be ignored is answered as if the field were absent.
-    """
+    """What is answered where a rule is broken; the value is what the page says."""
 
     REJECT = "MUST be rejected"
-    IGNORE = "MUST be rejected, or the field ignored"
+    IGNORE = "MUST be rejected, or answered without the field"
     EITHER = "MAY be rejected, or answered by either value"
     MAY_REJECT = "MUST be answered rightly or rejected; `undecided` passes"
     ARRIVE = "MUST be answered `horizon` with the state itself"
@@ -350,7 +348,8 @@ def page_section() -> str:
         rows = [rule for rule in RULES if rule.part == part]
         lines += [f"**{title}.**", "", "| rule | kept if | otherwise |", "| --- | --- | --- |"]
         lines += [f"| {rule.name} | {rule.condition} | {rule.otherwise.value} |" for rule in rows]
-        lines += ["", *(f"- *{rule.name}.* {rule.why}" for rule in rows if rule.why), ""]
+        reasons = [f"- *{rule.name}.* {rule.why}" for rule in rows if rule.why]
+        lines += ["", *(fill(reason, 118, subsequent_indent="  ") for reason in reasons), ""]
     return "\n".join(lines).replace("\n\n\n", "\n\n").strip() + "\n"
 
 

@@ -141,7 +141,7 @@ contains
         return
       end if
     end if
-    if (k > 100000 .or. s == 0 .or. abs(s - base) <= 1e-12_dp * s .or. (y == 0 .and. vy == 0)) then
+    if (k > 100000 .or. s == 0 .or. t_end == t .or. abs(s - base) <= 1e-12_dp * s .or. (y == 0 .and. vy == 0)) then
       print '(a)', trim(seq)//',undecided,,,,,,,'
       return
     end if

@@ -36,12 +36,17 @@ def say_interrupted() -> None:
 class Interrupt(KeyboardInterrupt):
     """Raised by a signal; tells its listener when nothing holds it any more."""
 
-    def __init__(self, listener: Listener) -> None:
+    def __init__(self, listener: Listener | None = None) -> None:
         super().__init__()
         self._listener = listener
 
+    def __reduce__(self) -> tuple[type[Interrupt], tuple[()]]:
+        """Leave the listener behind: in another process, or as a copy, it is an interrupt like any other."""
+        return Interrupt, ()
+
     def __del__(self) -> None:
-        self._listener.raise_again()
+        if self._listener is not None:
+            self._listener.raise_again()
 
 
 class Listener:

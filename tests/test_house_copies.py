@@ -39,6 +39,7 @@ from conformance.strategies import HypothesisDraw
 from conformance.suite.process import CheckFailure
 from mushrooms import lyapunov, orbits
 from mushrooms.figures import energies
+from mushrooms.interrupts import Interrupt
 from scene import geometry
 
 API = Path(__file__).parent.parent / "docs" / "api"
@@ -204,7 +205,10 @@ def all_errors() -> list[type]:
 
 
 # What an error is made with that takes other arguments than one text.
-ERRORS = {CheckFailure: lambda: CheckFailure("timed-out", "no answer within 1 s")}
+ERRORS = {
+    CheckFailure: lambda: CheckFailure("timed-out", "no answer within 1 s"),
+    Interrupt: Interrupt,  # in another process it has no listener
+}
 
 
 def error(kind):

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import pytest
 from hypothesis import settings
 from numba.core.dispatcher import Dispatcher
+from support import plain_terminal  # noqa: F401
 from support.entries import kept_entries
 
 import fast

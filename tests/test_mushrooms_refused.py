@@ -179,6 +179,11 @@ REFUSED: list[Any] = [
     (f"check --groups moving-cap,no-such -- {STEPPER}", ["must be one of"]),
     ("check --groups , -- true", ["--groups = ','"]),
     (f"check --known-failures absent.txt -- {STEPPER}", ["absent.txt"]),
+    (
+        f"check --corpus 1.3 -- {STEPPER}",
+        ["corpus", "'1.3'", "earlier release", "1.4", "1.0, 1.1, 1.2, 1.3, 1.4"],
+    ),
+    (f"check --corpus 2.0 -- {STEPPER}", ["corpus", "'2.0'", "does not exist", "1.4"]),
     ("ask", ["ID"]),
     ("ask no-such/1", ["ID = 'no-such/1'"]),
     ("ask fresh/1", ["--seed"]),

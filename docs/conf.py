@@ -5,6 +5,7 @@ makes every broken reference an error, and because autodoc shows signatures as t
 MathML when the site is built: a browser needs neither scripts nor a network for them.
 """
 
+import os
 import re
 import shutil
 import sys
@@ -59,12 +60,29 @@ copybutton_prompt_is_regexp = True
 WHOLE = ("audit", "bench")  # folders that are on the site as they are
 
 
+# Files outside docs/ that the site has as pages.
+PAGES = {
+    "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "theory/equations.md": "equations.md",
+}
+
+
+def new_figures(app: Any, name: str, text: list[str]) -> None:
+    """Take the numbers of a page from the commands and files that have them."""
+    from docs import figures
+
+    text[0] = figures.refreshed(text[0])
+
+
 def in_the_repository(app: Any, name: str, text: list[str]) -> None:
-    """Point links that leave docs/ at the repository."""
+    """Point links that leave docs/ at the pages that the site makes of them, or else at the repository."""
     folder = (DOCS / name).parent
 
     def address(found: re.Match[str]) -> str:
         target = (folder / found[1]).resolve()
+        if target.is_relative_to(ROOT) and (page := PAGES.get(target.relative_to(ROOT).as_posix())):
+            return f"]({os.path.relpath(DOCS / page, folder)}"
         if target.is_relative_to(DOCS) or not target.is_relative_to(ROOT):
             return found[0]
         return f"]({REPOSITORY}{target.relative_to(ROOT).as_posix()}"
@@ -169,6 +187,7 @@ def setup(app: Any) -> None:
     app.add_html_math_renderer("mathml", (as_mathml(False), None), (as_mathml(True), None))
     app.connect("builder-inited", draw_gallery)
     app.connect("builder-inited", write_commands)
+    app.connect("source-read", new_figures)
     app.connect("source-read", in_the_repository)
     app.connect("include-read", included)
     app.connect("autodoc-process-docstring", plain_docstring, priority=400)  # before napoleon

@@ -129,6 +129,7 @@ LEGEND = (
     (plots.GREY, "walls at the start"),
     (plots.BLACK, "walls at the certified hit"),
 )
+LEAST_SEEN = 1e-12  # of the table's size: two places that are closer are drawn as one
 CLOSE = 0.06  # half the width of the close-up, of the table's size; more where the two hits lie further apart
 # The certified path and the given one: colour, width and name.
 STROKES = ((plots.ORANGE, 4.0, "certified"), (plots.BLUE, 1.5, "given"))
@@ -155,11 +156,50 @@ def paths(result: Result, vector: vectors.Vector) -> bytes:
     return plots.svg(figure)
 
 
-def draw_step(scene: Scene, state: State, truth: Collision | Horizon, given: Mapping[str, Any]) -> bytes:
-    """Draw one step as SVG: where it leads, and where it was said to; the whole table, and close up."""
+@rc_context(plots.STYLE)
+def draw_step(
+    scene: Scene, state: State, truth: Collision | Horizon, given: Mapping[str, Any], number: int
+) -> bytes:
+    """Draw one step as SVG: where it leads, and where it was said to; the whole table, and close up.
+
+    The close-up is as large as the distance of both places, so that this is seen. The title names the field
+    that is off most. Velocities are compared with the speed, places with the table's size.
+
+    Args:
+        scene: of the step.
+        state: where it begins.
+        truth: its certified end.
+        given: its end as it was given; fields may be missing.
+        number: of the step, from 1.
+    """
+    size = float(np.ptp(np.hstack(draw.walls(scene, truth.t)), axis=1).max())
+    certified = {**_fields(truth), "t": truth.t}
+    far = math.hypot(given["x"] - truth.x, given["y"] - truth.y)
     figure = _draw(scene, state, truth.t, ([_fields(truth)], [dict(given)]), 0, "-")
-    figure.axes[0].legend(loc="best")
+    figure.axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+    if far > LEAST_SEEN * size:
+        _close_up(figure.axes[1], [_fields(truth), given], 2.0 * far)
+    figure.axes[1].set_title("close to the end")
+    figure.axes[1].locator_params(nbins=4)
+    speed = math.hypot(truth.vx, truth.vy)
+    scales = {"t": abs(truth.t), "x": size, "y": size, "vx": speed, "vy": speed}
+    figure.suptitle(f"step {number}: {_worst_field(certified, given, scales, getattr(truth, 'wall', None))}")
     return plots.svg(figure)
+
+
+def _worst_field(
+    certified: Mapping[str, float], given: Mapping[str, Any], scales: Mapping[str, float], wall: str | None
+) -> str:
+    """Say which field of a step is off most, by its scale; a wrong wall before any number."""
+    if given.get("wall") not in (None, wall):
+        return f"wall = {given['wall']}, must be {wall}"
+
+    def error(name: str) -> float:
+        return abs(given[name] - certified[name]) / (scales[name] or 1.0)
+
+    worst = max((name for name in scales if name in given), key=error)
+    gap = given[worst] - certified[worst]
+    return f"{worst} = {given[worst]:.10g}, must be {certified[worst]:.10g}: off by {gap:.2g}"
 
 
 @rc_context(plots.STYLE)

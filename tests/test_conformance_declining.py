@@ -1,0 +1,154 @@
+"""A stepper that declines: one verdict in a dialogue and behind files, whatever the seed draws.
+
+Both steppers answer as the fast one does. One declines a share of all states by their numbers, one all states
+that begin late. What is too much stands in docs/protocol.md, and once in the code: `declines_too_much`.
+"""
+
+import hashlib
+import json
+from fractions import Fraction
+from math import comb
+
+import pytest
+from support.depth import deep_but
+from support.faulty_steppers import faulty
+
+from conformance import vectors
+from conformance.suite import run as suite, sheet as sheets
+from conformance.suite.checks import checks_of, flows
+from conformance.suite.result import DOUBT, declines_too_much
+from conformance.suite.session import Session
+
+ASKED = (
+    "property/mirror",
+    "promise/hits",
+    "promise/late-starts",
+    "promise/long-paths",
+    "promise/endings",
+    "promise/spelling",
+    "promise/time-steps",
+    "profile/captured-share",
+)
+OPEN = {"outcome": "undecided", "reason": "by content"}
+NUMBERS = ("x", "y", "vx", "vy")
+
+
+def by_content(share):
+    """Return what declines a share of all states, each by its own numbers."""
+
+    def declines(state):
+        digest = hashlib.sha256(repr([state[name] for name in NUMBERS]).encode()).digest()
+        return int.from_bytes(digest[:8], "big") < share * 2**64
+
+    return declines
+
+
+def late(state):
+    return abs(state["t"]) > 100
+
+
+def declining(declines):
+    """Return an honest stepper that leaves what follows some states undecided."""
+
+    def fault(request, answer):
+        found = answer(request)
+        if found.get("outcome") in ("collision", "horizon") and declines(request["state"]):
+            return {"seq": found["seq"], **OPEN}
+        if found.get("steps") and "ns" not in found:
+            before = [request["state"], *found["steps"]]
+            first = next((i for i, at in enumerate(before[:-1]) if declines(at)), len(before))
+            if first < len(found["steps"]) and found["steps"][first]["outcome"] != "rejected":
+                return {**found, "steps": [*found["steps"][:first], OPEN]}
+        if found.get("states"):
+            pairs = zip(request["states"], found["states"], strict=True)
+            ends = [OPEN if end["outcome"] == "horizon" and declines(at) else end for at, end in pairs]
+            return {**found, "states": ends}
+        return found
+
+    return faulty(fault)
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Some vectors of every kind, and some checks; of the profile the size at level core."""
+    chosen = [vector for vector in vectors.load("core") if vector.group != "longest-flow"][::12]
+    checks = [check for check in checks_of() if check.name in ASKED]
+    monkeypatch.setattr(suite, "choose", lambda *_: chosen)
+    monkeypatch.setattr(suite, "N_FRESH", dict.fromkeys(suite.N_FRESH, 0))
+    monkeypatch.setattr(suite, "checks_of", lambda *_: checks)
+    monkeypatch.setattr(sheets, "checks_of", lambda *_: checks)
+    monkeypatch.setitem(flows.SIZES, "core", flows.Size(200, 100.0, 0.2))
+
+
+def runs(declines, seed, folder):
+    """Return the run of a dialogue, and that of the answers to a file of questions."""
+    answer = declining(declines)
+    with Session(answer) as session:
+        dialogue = suite.converse(session, suite.RunQuestions("core", seed))
+    sheet = sheets.Sheet("core", seed)
+    path = folder / "answers.jsonl"
+    path.write_bytes(b"\n".join(answer(line) for line in sheet.lines()[:-1]))
+    return dialogue, sheets.grade_answers(sheet, sheets.read_answers(path))
+
+
+@pytest.mark.parametrize("seed", deep_but(range(1, 6), 3))
+@pytest.mark.parametrize("share", [0.006, 0.03])
+def test_a_small_share_is_accepted_whatever_the_mode_and_the_seed(few, tmp_path, share, seed):
+    for run in runs(by_content(share), seed, tmp_path):
+        assert (run.objections(), run.exit_code()) == ([], 0)
+        assert sum(result.n_undecided for result in run.results) > 0
+
+
+@pytest.mark.parametrize("seed", deep_but(range(1, 6), 1))
+@pytest.mark.parametrize(
+    ("declines", "part"),
+    [(by_content(0.6), "vectors and fresh questions"), (late, "promise/late-starts")],
+    ids=["60 %", "late starts"],
+)
+def test_too_much_is_refused_whatever_the_mode_and_the_seed(few, tmp_path, declines, part, seed):
+    for run in runs(declines, seed, tmp_path):
+        assert run.exit_code() == 1
+        assert any(part in line for line in run.objections())
+        assert not [result for result in run.results if result.verdict == "fail"]
+
+
+@pytest.mark.parametrize(
+    ("n_declined", "n", "limit", "is_too_much"),
+    [
+        (0, 0, 0.25, False),
+        (4, 4, 0.25, False),  # 1 in 256 by chance
+        (5, 5, 0.25, True),
+        (12, 32, 0.25, False),  # a halving of intervals that declines 2.4 % of all: one group by chance
+        (19, 32, 0.25, True),
+        (6, 38, 0.25, False),
+        (2, 3, 0.05, False),
+        (300, 2000, 0.05, True),
+        (30_000, 30_000, 0.25, True),
+    ],
+)
+def test_what_is_too_much(n_declined, n, limit, is_too_much):
+    assert declines_too_much(n_declined, n, limit) == is_too_much
+
+
+@pytest.mark.parametrize("limit", [0.05, 0.25])
+def test_the_bound_is_the_binomial_one(limit):
+    """Against exact fractions: no float is taken for a number of ways."""
+    p = Fraction(limit)
+    for n in (1, 2, 5, 7, 14, 40):
+        for k in range(n + 1):
+            exact = sum(comb(n, i) * p**i * (1 - p) ** (n - i) for i in range(k, n + 1))
+            assert declines_too_much(k, n, limit) == (exact < DOUBT), (k, n)
+
+
+def test_equal_questions_count_once(few, tmp_path):
+    """A check that asks a question again, or in other words, does not count its answer again."""
+    dialogue, files = runs(by_content(0.0), 1, tmp_path)
+    asked = {
+        json.dumps(q.request["state"])
+        for q in sheets.Sheet("core", 1).questions.values()
+        if q.case == "promise/late-starts"
+    }
+    (found,) = [result for result in files.results if result.id == "promise/late-starts"]
+    assert len(asked) <= found.n_answers <= 2 * len(asked)
+    (spelling,) = [result for result in dialogue.results if result.id == "promise/spelling"]
+    assert 0 < spelling.n_answers < 40

@@ -171,6 +171,14 @@ def copy_reports(app: Any, error: Exception | None) -> None:
             shutil.copytree(DOCS / name, Path(app.outdir) / name, dirs_exist_ok=True)
 
 
+def whole_options(app: Any, page: str, template: str, context: dict[str, Any], tree: Any) -> None:
+    """Mark the names of options, which a narrow page would break after their hyphens."""
+    if "body" in context:
+        context["body"] = re.sub(
+            r'<span class="pre">(?=--[a-z])', '<span class="pre option">', context["body"]
+        )
+
+
 def as_mathml(is_block: bool) -> Any:
     """Return how a formula is written into a page."""
 
@@ -193,4 +201,5 @@ def setup(app: Any) -> None:
     app.connect("autodoc-process-docstring", plain_docstring, priority=400)  # before napoleon
     app.connect("autodoc-process-signature", bare_alias)
     app.connect("autodoc-skip-member", no_alias)
+    app.connect("html-page-context", whole_options)
     app.connect("build-finished", copy_reports)

@@ -37,7 +37,7 @@ N_PLACES = 1500
 N_LINES = 12  # single particles drawn beside the mean
 N_MARKS = 60  # cycles at which a mean is drawn, at most
 ENOUGH = 10_000  # particles that say where the bars go
-ROOM = 1.15  # height of a panel, by that of the highest curve
+ROOM = 1.08  # height of a panel, by that of the highest curve or bar with its error
 LEAST_EXPECTED = 5.0  # particles in a bin, to speak of standard errors
 TAIL = 0.0005  # left out at either side
 LEAST_SPAN = 1e-12  # of a histogram: what is less is rounding
@@ -191,8 +191,7 @@ def _title(scene: Scene, energy: float, bars: Gathered, n_particles: int | None)
 
 def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
     """Draw a histogram, with the limit of high energies if theory covers the scene."""
-    heights, edges = _bars(axes, bars), bars.edges
-    highest = float(heights.max())
+    highest, edges = _bars(axes, bars), bars.edges
     with suppress(*NO_THEORY):
         if isinstance(scene, Mushroom) and begins_widest(scene):
             theirs = draw_adiabatic(axes, theory.energies(scene), edges, "at high energies")
@@ -247,13 +246,13 @@ def draw_never_captured(axes: Axes, place: float) -> None:
 
 def draw(axes: Axes, rest: Axes | None, bars: Gathered, found: theory.FiniteEnergy) -> None:
     """Draw a histogram, the theory over it, and residuals into `rest` if there is one."""
-    heights, edges = _bars(axes, bars), bars.edges
+    top, edges = _bars(axes, bars), bars.edges
     shares = np.diff(found.cdf(edges))
     if rest is None:
         axes.set(xlabel=AXIS)
     else:
         _residuals(rest, bars.counts, shares * bars.n, edges)
-    highest = _draw_density(
+    theirs = _draw_density(
         axes,
         found.cdf,
         edges,
@@ -261,18 +260,18 @@ def draw(axes: Axes, rest: Axes | None, bars: Gathered, found: theory.FiniteEner
         linewidth=1.3,
         label=f"theory at this energy, peak {found.peak[1] ** 0.5:.4f} wide",
     )
-    top = ROOM * max(float(heights.max()), highest)
-    axes.set(xlim=(edges[0], edges[-1]), ylim=(0, top), ylabel="density")
+    axes.set(xlim=(edges[0], edges[-1]), ylim=(0, ROOM * max(top, theirs)), ylabel="density")
 
 
-def _bars(axes: Axes, bars: Gathered) -> FloatArray:
-    """Draw densities with their standard errors, and return them."""
+def _bars(axes: Axes, bars: Gathered) -> float:
+    """Draw densities with their standard errors, and return the highest end of an error bar."""
     unit = bars.n * np.diff(bars.edges)
     heights: FloatArray = bars.counts / unit
     axes.stairs(heights, bars.edges, fill=True, color=SKY, label="simulation")
     places = (bars.edges[1:] + bars.edges[:-1]) / 2
-    axes.errorbar(places, heights, np.sqrt(bars.counts) / unit, fmt="none", ecolor=BLUE, elinewidth=0.7)
-    return heights
+    errors = np.sqrt(bars.counts) / unit
+    axes.errorbar(places, heights, errors, fmt="none", ecolor=BLUE, elinewidth=0.7)
+    return float((heights + errors).max())
 
 
 def _residuals(rest: Axes, counts: IntArray, expected: FloatArray, edges: FloatArray) -> None:

@@ -195,7 +195,7 @@ def _worst_field(
         return f"wall = {given['wall']}, must be {wall}"
 
     def error(name: str) -> float:
-        return abs(given[name] - certified[name]) / (scales[name] or 1.0)
+        return abs(float(given[name]) - certified[name]) / (scales[name] or 1.0)
 
     worst = max((name for name in scales if name in given), key=error)
     gap = given[worst] - certified[worst]

@@ -69,10 +69,10 @@ PAGES = {
 
 
 def new_figures(app: Any, name: str, text: list[str]) -> None:
-    """Take the numbers of a page from the commands and files that have them."""
+    """Take a page's numbers from the commands and files that have them, its pictures from its code."""
     from docs import figures
 
-    text[0] = figures.refreshed(text[0])
+    text[0] = figures.refreshed(text[0]).replace("](gallery/", "](generated/")
 
 
 def in_the_repository(app: Any, name: str, text: list[str]) -> None:
@@ -174,9 +174,7 @@ def copy_reports(app: Any, error: Exception | None) -> None:
 def whole_options(app: Any, page: str, template: str, context: dict[str, Any], tree: Any) -> None:
     """Mark the names of options, which a narrow page would break after their hyphens."""
     if "body" in context:
-        context["body"] = re.sub(
-            r'<span class="pre">(?=--[a-z])', '<span class="pre option">', context["body"]
-        )
+        context["body"] = re.sub(r'<span class="pre">(?=--)', '<span class="pre option">', context["body"])
 
 
 def as_mathml(is_block: bool) -> Any:

@@ -146,7 +146,9 @@ def numbers_of_audit() -> str:
         ]
         for row in re.findall(r"<tr.*?</tr>", table, re.DOTALL)
     ]
-    return as_table(rows[0], rows[1:], n_left=2)
+    (_, _, there, theory, _, *here), *numbers = rows
+    short = [(f"{run}: {what}", *cells[:2], *cells[3:]) for run, what, *cells in numbers]
+    return as_table(("run: number", there, theory, *here), short)
 
 
 CELL = r"<t[hd].*?</t[hd]>"

@@ -424,13 +424,20 @@ def test_the_commands_of_a_page_do_what_they_say(command_line, tmp_path, monkeyp
 def test_the_pictures_of_the_pages_are_made(tmp_path):
     """All of them, by the code that stands above each; a page shows every picture that it makes."""
     for page in DOCS.glob("*.md"):
-        shown = re.findall(r"\]\(generated/([^)]+)\)", page.read_text("utf-8"))
+        shown = re.findall(r"\]\(gallery/([^)]+)\)", page.read_text("utf-8"))
         pictures.draw(page, tmp_path)
         made = [name for name, _ in pictures.blocks(page)]
         assert sorted(made) == sorted(shown)
         for name in made:
             start = {".svg": b"<?xml", ".png": b"\x89PNG", ".gif": b"GIF89a"}[Path(name).suffix]
             assert (tmp_path / name).read_bytes().startswith(start)
+
+
+def test_the_repository_holds_the_pictures_of_its_pages():
+    """If this fails, `python -m docs.pictures` makes them anew."""
+    assert json.loads((pictures.GALLERY / "blocks.json").read_bytes()) == pictures.digests()
+    made = {name for page in DOCS.glob("*.md") for name, _ in pictures.blocks(page)}
+    assert {path.name for path in pictures.GALLERY.iterdir()} == made | {"blocks.json"}
 
 
 def test_a_block_that_fails_is_not_passed_over(tmp_path):

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import msgspec
+import numpy as np
 import pytest
 from matplotlib.text import Text
 from support.depth import deep_but
@@ -303,6 +304,8 @@ def test_the_picture_of_a_false_step_shows_what_is_off(name, change, words):
         left, right = figure.axes[1].get_xlim()
         assert 2e-4 < right - left < 8e-4
         assert left < min(truth.x, given["x"]) < max(truth.x, given["x"]) < right
+        points = np.hstack([line.get_data() for line in figure.axes[1].lines if len(line.get_xdata()) > 100])
+        assert np.hypot(points[0] - truth.x, points[1] - truth.y).min() < 2e-5  # the arc goes through the hit
 
 
 ROOT = Path(__file__).parent.parent

@@ -447,7 +447,7 @@ def test_the_legend_of_a_path_stands_below_its_axes(moving):
 def test_the_particle_of_the_gallery_is_captured():
     """The page explains a black line and a shade."""
     page = (Path(__file__).parent.parent / "docs" / "gallery.md").read_text("utf-8")
-    [code] = [code for name, code in BLOCK.findall(page) if name == "gallery-particle.svg"]
+    [code] = [code for name, code in BLOCK.findall(page) if name == "gallery-particle.png"]
     given = {"moving_cap": MOVING, "orbits": orbits, "pictures": pictures}
     exec(code, given)
     shown = given["figure"].axes[0].get_legend_handles_labels()[1]

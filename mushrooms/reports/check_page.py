@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from mpmath import fp
 
 from conformance import vectors
 from conformance.grading.agreement import FAIR, SHARP, middle
@@ -21,6 +22,7 @@ from conformance.suite.session import outcomes_of
 from mushrooms.figures import style as plots, table as draw
 from mushrooms.reports.page import embed, render
 from scene import BadInput, Collision, Horizon, Outcome, Scene, State, from_data
+from scene.geometry import table_at
 
 N_FAILED, N_SHARPEST = 8, 4  # cases drawn: those that failed, or else the least precise that passed
 MAX_LISTED = 200
@@ -129,6 +131,7 @@ LEGEND = (
     (plots.GREY, "walls at the start"),
     (plots.BLACK, "walls at the certified hit"),
 )
+N_CHORDS = 180  # of an arc, as `Table.outline` has it
 LEAST_SEEN = 1e-12  # of the table's size: two places that are closer are drawn as one
 CLOSE = 0.06  # half the width of the close-up, of the table's size; more where the two hits lie further apart
 # The certified path and the given one: colour, width and name.
@@ -179,12 +182,27 @@ def draw_step(
     figure.axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
     if far > LEAST_SEEN * size:
         _close_up(figure.axes[1], [_fields(truth), given], 2.0 * far)
+        _bend_arcs(figure.axes[1], scene, (state.t, truth.t), truth, 8.0 * far)
     figure.axes[1].set_title("close to the end")
     figure.axes[1].locator_params(nbins=4)
     speed = math.hypot(truth.vx, truth.vy)
     scales = {"t": abs(truth.t), "x": size, "y": size, "vx": speed, "vy": speed}
     figure.suptitle(f"step {number}: {_worst_field(certified, given, scales, getattr(truth, 'wall', None))}")
     return plots.svg(figure)
+
+
+def _bend_arcs(
+    axes: Axes, scene: Scene, times: Sequence[float], at: Collision | Horizon, reach: float
+) -> None:
+    """Draw the arcs near a place by points as close as a close-up needs: its chords would miss the hit."""
+    if at.y <= reach:
+        return  # the base is near too, and drawn by the same line
+    arcs = [line for line in axes.lines if len(line.get_xdata()) > N_CHORDS]
+    for line, t in zip(arcs, times, strict=False):
+        r = float(table_at(fp, scene, t).r)
+        middle = math.atan2(at.y, at.x)
+        angles = np.linspace(middle - reach / r, middle + reach / r, N_CHORDS)
+        line.set_data(r * np.cos(angles), r * np.sin(angles))
 
 
 def _worst_field(

@@ -116,12 +116,13 @@ def test_too_much_is_refused_whatever_the_mode_and_the_seed(few, tmp_path, decli
     ("n_declined", "n", "limit", "is_too_much"),
     [
         (0, 0, 0.25, False),
-        (4, 4, 0.25, False),  # 1 in 256 by chance
-        (5, 5, 0.25, True),
+        (3, 3, 0.25, False),  # 1 in 64 by chance
+        (4, 4, 0.25, True),
         (12, 32, 0.25, False),  # a halving of intervals that declines 2.4 % of all: one group by chance
-        (19, 32, 0.25, True),
+        (15, 32, 0.25, True),
+        (13, 26, 0.25, True),  # every path ends so after its first hit
         (6, 38, 0.25, False),
-        (2, 3, 0.05, False),
+        (1, 3, 0.05, False),
         (300, 2000, 0.05, True),
         (30_000, 30_000, 0.25, True),
     ],
@@ -152,9 +153,18 @@ def test_equal_questions_count_once():
         tally.add({**path, "seq": seq}, ["collision", "collision", "undecided"])
         tally.add({**flow, "seq": seq}, ["horizon", "undecided", "horizon"])
         tally.add({**flow, "states": [other]}, ["undecided"])
-    assert (tally.n, tally.n_undecided) == (1 + 3 + 2, 3)
+    assert tally.counts() == (3, 1 + 3 + 2)
     tally.excuse(path)
-    assert (tally.n, tally.n_undecided) == (3, 2)
+    assert tally.counts() == (2, 3)
+
+
+def test_what_is_asked_as_steps_does_not_speak_for_paths():
+    tally = AnswerTally()
+    for i in range(100):
+        tally.add({"cmd": "step", "state": {"x": i}}, ["collision"])
+    for i in range(13):
+        tally.add({"cmd": "trajectory", "state": {"x": i}}, ["collision", "undecided"])
+    assert tally.counts() == (13, 26)
 
 
 def test_a_missing_answer_is_an_undecided_one(few, tmp_path):

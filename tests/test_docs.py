@@ -521,9 +521,9 @@ def words_of_declining() -> str:
     """Find how few of some answers are too many."""
     least = [
         f"{next(k for k in range(n + 1) if declines_too_much(k, n, MAX_DECLINED_OF_PART))} of {n}"
-        for n in (5, 20, 50)
+        for n in (4, 20, 50)
     ]
-    assert not declines_too_much(4, 4, MAX_DECLINED_OF_PART)
+    assert not declines_too_much(3, 3, MAX_DECLINED_OF_PART)
     return (
         f"So {least[0]}, {least[1]} or {least[2]} answers are more than {MAX_DECLINED_OF_PART:.0%}".replace(
             "%", " %"

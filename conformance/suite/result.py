@@ -26,7 +26,7 @@ VERDICTS = ("pass", "fail", "indeterminate", "declined", "unsupported", *BAD[1:]
 # A stepper that declines more has not been graded: of all vectors and fresh questions; of a part, which is
 # one group of these, or one check.
 MAX_DECLINED, MAX_DECLINED_OF_PART = 0.05, 0.25
-DOUBT = 1e-3  # probability of as many undecided answers at the limit: below it the limit is surely exceeded
+DOUBT = 1e-2  # probability of as many undecided answers at the limit: below it the limit is surely exceeded
 NOT_KNOWN = "though it is listed as a known failure"
 
 
@@ -34,8 +34,8 @@ def declines_too_much(n_declined: int, n: int, limit: float) -> bool:
     """Tell whether n_declined of n answers show that a stepper declines more than a limit.
 
     They do if a stepper that declines at the limit, each answer for itself, leaves so many or more undecided
-    with a probability below DOUBT. The verdict on a stepper within the limit then depends neither on the draw
-    nor on how many answers are asked for. No fewer than five answers show a share above 25 %.
+    with a probability below DOUBT. The verdict on a stepper well within the limit then depends neither on the
+    draw nor on how many answers are asked for. No fewer than four answers show a share above 25 %.
 
     Args:
         n_declined: answers that are undecided where `undecided` does not pass.
@@ -73,7 +73,8 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
         is_known: listed in the known-failures file.
         sent: of a case that did not pass, the last line that was sent for it.
         paste: of a check that failed, the question as a pytest case.
-        n_answers: of a check, how many different answers were asked for.
+        n_answers: of a check, how many different answers were asked for: of the command of which too many are
+            undecided, if there is one, or else of all.
         n_undecided: of these, how many were undecided where `undecided` does not pass.
     """
 

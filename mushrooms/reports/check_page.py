@@ -197,7 +197,7 @@ def _bend_arcs(
     """Draw the arcs near a place by points as close as a close-up needs: its chords would miss the hit."""
     if at.y <= reach:
         return  # the base is near too, and drawn by the same line
-    arcs = [line for line in axes.lines if len(line.get_xdata()) > N_CHORDS]
+    arcs = [line for line in axes.lines if np.size(line.get_xdata()) > N_CHORDS]
     for line, t in zip(arcs, times, strict=False):
         r = float(table_at(fp, scene, t).r)
         middle = math.atan2(at.y, at.x)

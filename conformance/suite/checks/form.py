@@ -9,6 +9,7 @@ import hashlib
 import math
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -50,36 +51,41 @@ class AnswerTally:
     """The different answers that a check asked for, and those left undecided where `undecided` does not pass.
 
     Equal questions count once, so that a run counts what a file of questions counts. A path has an answer for
-    each of its steps, a flow one for each different state.
+    each of its steps, a flow one for each different state. Each command is counted for itself: what is asked
+    as steps does not speak for paths.
     """
 
     def __init__(self) -> None:
-        self._counted: dict[bytes, tuple[int, int]] = {}
+        self._counted = defaultdict[str, dict[bytes, tuple[int, int]]](dict)
 
-    @property
-    def n(self) -> int:
-        """Return how many answers there are."""
-        return sum(n for n, _ in self._counted.values())
+    def counts(self) -> tuple[int, int]:
+        """Return how many answers are undecided, and how many there are.
 
-    @property
-    def n_undecided(self) -> int:
-        """Return how many of them are undecided."""
-        return sum(n_undecided for _, n_undecided in self._counted.values())
+        They are those of the first command of which too many are undecided, or else those of all commands.
+        """
+        found = [
+            (sum(n_undecided for n_undecided, _ in counted.values()), sum(n for _, n in counted.values()))
+            for counted in self._counted.values()
+        ]
+        for n_undecided, n in found:
+            if declines_too_much(n_undecided, n, MAX_DECLINED_OF_PART):
+                return n_undecided, n
+        return sum(n_undecided for n_undecided, _ in found), sum(n for _, n in found)
 
     def add(self, request: Mapping[str, Any], outcomes: Sequence[str]) -> None:
         """Count what answers a request: its outcomes, in order."""
-        keys = _keys_of(request)
+        keys, counted = _keys_of(request), self._counted[str(request.get("cmd"))]
         if len(keys) == len(outcomes):
             for key, outcome in zip(keys, outcomes, strict=True):
-                self._counted[key] = (1, int(outcome == "undecided"))
+                counted[key] = (int(outcome == "undecided"), 1)
         else:
             n_undecided = sum(outcome == "undecided" for outcome in outcomes)
-            self._counted[b"".join(keys)] = (len(outcomes), n_undecided)
+            counted[b"".join(keys)] = (n_undecided, len(outcomes))
 
     def excuse(self, request: Mapping[str, Any]) -> None:
         """Take back what was counted of a request: `undecided` passes there, as nothing else is right."""
         for key in _keys_of(request):
-            self._counted.pop(key, None)
+            self._counted[str(request.get("cmd"))].pop(key, None)
 
 
 def _keys_of(request: Mapping[str, Any]) -> list[bytes]:
@@ -206,8 +212,8 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
             why,
             time.monotonic() - begin,
             paste=paste,
-            n_answers=answers.n,
-            n_undecided=answers.n_undecided,
+            n_answers=answers.counts()[1],
+            n_undecided=answers.counts()[0],
         )
 
     for profile in check.profiles:
@@ -232,13 +238,14 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
                     why = f"{profile}: {failure.why}"
                     return result(failure.verdict, why, as_pytest(check, profile, asked))
     why = "; ".join(notes[:4]) or f"{n_compared} of {n} compared"
-    if answers.n_undecided:
-        why += f"; {answers.n_undecided} of {answers.n} answers are undecided"
-    if declines_too_much(answers.n_undecided, answers.n, MAX_DECLINED_OF_PART):
+    n_undecided, n_answers = answers.counts()
+    if n_undecided:
+        why += f"; {n_undecided} of {n_answers} answers are undecided"
+    if declines_too_much(n_undecided, n_answers, MAX_DECLINED_OF_PART):
         return result("declined", why)
     if n_compared:
         return result("pass", why)
-    if n_declined or answers.n_undecided:
+    if n_declined or n_undecided:
         return result("declined", why)
     return result("unsupported", lacking or "nothing to compare")
 

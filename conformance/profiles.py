@@ -281,7 +281,7 @@ def reversal(
     gain, end = energies[..., 1] - energies[..., 0], energies[..., 1]
     stays = (energy < end) & (end < 4 * energy)
     raised, lowered = (stays & (gain > 0)).astype(float), (stays & (gain < 0)).astype(float)
-    alike = float(1 + raised[0].mean() - lowered[0].mean()) / 2
+    alike = float(1 + raised[0].mean() - lowered[0].mean()) / 2 if energies.size else 0.5
     x = (1 + raised[0] - lowered[1]) / 2
     return _statistic(
         "reversal",

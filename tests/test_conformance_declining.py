@@ -13,12 +13,13 @@ import pytest
 from support.depth import deep_but
 from support.faulty_steppers import faulty
 
-from conformance import vectors
+from conformance import profiles, vectors
 from conformance.suite import run as suite, sheet as sheets
 from conformance.suite.checks import checks_of, flows
 from conformance.suite.checks.form import AnswerTally
 from conformance.suite.result import DOUBT, declines_too_much
 from conformance.suite.session import Session
+from scene import Horizon, Undecided, Undefined, load
 
 ASKED = (
     "property/mirror",
@@ -179,3 +180,44 @@ def test_a_missing_answer_is_an_undecided_one(few, tmp_path):
         (found,) = [result for result in run.results if result.id == "promise/late-starts"]
         assert found.n_undecided == len(missing)
         assert (run.exit_code(), bool(run.objections())) == (code, bool(code)), run.objections()
+
+
+STATISTICS = {
+    "work-identity": lambda flow: profiles.work_identity(flow, CAP, n_particles=200, kT=10.0)[0],
+    "captured-share": lambda flow: profiles.captured_share(
+        flow, CAP, p_nc=0.4, n_particles=200, energy=10.0, bias=0.1
+    ),
+    "mean-growth": lambda flow: profiles.mean_growth(
+        flow, CAP, m1=0.1, largest=1.0, n_particles=200, energy=10.0, bias=0.1
+    ),
+    "reversal": lambda flow: profiles.reversal(flow, CAP, n_particles=200, energy=10.0),
+}
+CAP = load("moving-cap")
+
+
+def leaving(outcome, share):
+    """Return a flow that moves no particle, and gives a share of them another outcome."""
+
+    def flow(scene, states, t_end):
+        ends = [Horizon(t_end, s.x, s.y, s.vx, s.vy) for s in states]
+        return [(outcome if i < share * len(ends) else end, None) for i, end in enumerate(ends)]
+
+    return flow
+
+
+@pytest.mark.parametrize("name", STATISTICS)
+def test_an_undecided_particle_is_not_lost(name):
+    """It may have had any value, so the margin grows as for a lost one; all undecided tell nothing."""
+    whole, left, lost, none = (
+        STATISTICS[name](leaving(outcome, share))
+        for outcome, share in (
+            (Undecided("x"), 0.0),
+            (Undecided("x"), 0.1),
+            (Undefined("corner"), 0.1),
+            (Undecided("x"), 1.0),
+        )
+    )
+    assert (left.lost, left.undecided, left.is_depleted) == (0, 20, False)
+    assert (lost.lost, lost.undecided, lost.is_depleted) == (20, 0, True)
+    assert left.margin == lost.margin > whole.margin
+    assert (none.is_met, none.is_depleted, none.has_power) == (True, False, False)

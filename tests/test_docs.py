@@ -611,6 +611,10 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "blocks": ("docs/ensembles.md", lambda: f"by default {conduct.LEAST_BLOCK} to {conduct.MOST_BLOCK},"),
     "fill values": ("docs/ensembles.md", words_of_whole_arrays),
     **{f"fast.{name}": ("docs/api/fast.md", partial("fast.{} ".format, name)) for name in fast.__all__},
+    "digits of a path": (
+        "docs/limits.md",
+        lambda: f"after about {BENCH['growth']['lasts']['binary64 (plain Python)']:.0f} collisions",
+    ),
     "rare errors": ("docs/speed.md", words_of_rare_errors),
     "digits lost": (
         "docs/speed.md",

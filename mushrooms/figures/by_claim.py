@@ -394,8 +394,8 @@ ALL = (
     Picture(
         "X1",
         "Energies after one cycle, fixed cap. In theory (orange) the never captured share one energy,"
-        " dashed. The other curve is the theory at this energy, with diffusion and lags from frozen tables and"
-        " nothing fitted.",
+        " dashed. The other curve is the theory at this energy, with diffusion and lags from frozen tables"
+        " and nothing fitted.",
         energies,
         partial(with_residuals, 2),
         (ACW, CW),

@@ -304,8 +304,15 @@ def _span(scene: Scene, alarm: float) -> float:
 
 
 def check_work_identity(flow: Flowing, scene: Scene, *, n_particles: int, kT: float, seed: int = 0) -> None:
-    """Raise AssertionError, with one line, if `work_identity` fails or too many particles are lost."""
-    require(work_identity(flow, scene, n_particles=n_particles, kT=kT, seed=seed))
+    """Raise AssertionError, with one line, if `work_identity` fails or shows nothing.
+
+    It shows nothing if too many particles are lost, or so many are undecided that anything would do.
+    """
+    findings = work_identity(flow, scene, n_particles=n_particles, kT=kT, seed=seed)
+    require(findings)
+    for finding in findings:
+        if finding.undecided and not finding.has_power:
+            raise AssertionError(f"{finding}: so many are undecided that anything would do")
 
 
 def require(findings: Sequence[Statistic]) -> None:

@@ -352,7 +352,7 @@ RUN_ELSEWHERE = {
     "corpus.md": {"json"},  # the published line
     "cite.md": {"bibtex"},  # test_house_package
     "clusters.md": {"bash"},  # with few particles
-    "audit.md": {""},  # test_mushrooms_audit: the commands, and the runs that they make taken up
+    "audit.md": {"", "none"},  # test_mushrooms_audit: the commands, and the runs that they make; a region
     "ensembles.md": {"", "python"},  # test_mushrooms_simulate, with fewer particles
 }
 INSTALLS = ("pip install", "mushrooms --version", "git clone", "cd oscillating-mushrooms")

@@ -217,4 +217,4 @@ def _draw(data: dict[str, Any], at: int) -> bytes:
     found = reference.next_collision(scene, state, float(data.get("t_end", 1e300)))
     if not isinstance(found, reference.Collision | reference.Horizon):
         raise BadInput(f"--picture: step {at + 1} from {shown(str(state))} has no certified end to draw")
-    return check_page.draw_step(scene, state, found.rounded(), given)
+    return check_page.draw_step(scene, state, found.rounded(), given, at + 1)

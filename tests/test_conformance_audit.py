@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from mpmath import fp
 from msgspec.structs import replace
-from support import adiabatic_particles
+from support import adiabatic_particles, claim_numbers
 from support.depth import deep_among, deep_but
 
 import fast
@@ -34,7 +34,7 @@ from conformance.audit.frozen import (
     measured,
     passages,
 )
-from conformance.audit.runs import RUNS, SCENES, draw, scene_of
+from conformance.audit.runs import RUNS, SCENES, Sample, draw, scene_of
 from conformance.audit.session import AuditSettings, conduct
 from conformance.audit.tolerances import MAX_TESTS, N_SIGMA, close, fits, half_unit, power
 from scene import BangBang, Mushroom, load
@@ -328,8 +328,13 @@ COMPARISONS = {
 
 
 @cache
-def recorded(name: str, n: int | None = None) -> list[Recorded]:
-    """Return the comparisons that a claim makes on ensembles that are right, or on their first particles."""
+def sample_of(run: str, simulate) -> Sample:
+    return draw(simulate, RUNS[run], size="quick", seed=0, threads=1)
+
+
+@cache
+def recorded(name: str) -> list[Recorded]:
+    """Return the comparisons that a claim makes on ensembles that are right."""
     (claim,) = select_claims(name)
     log: list[Recorded] = []
 
@@ -342,11 +347,7 @@ def recorded(name: str, n: int | None = None) -> list[Recorded]:
         return compare
 
     simulate = fast.simulate if name in REAL else adiabatic_particles.simulate
-    samples = {}
-    for run in claim.runs:
-        if RUNS[run].quick:
-            of = RUNS[run] if n is None else RUNS[run]._replace(quick=n)
-            samples[run] = draw(simulate, of, size="quick", seed=0, threads=1)
+    samples = {run: sample_of(run, simulate) for run in claim.runs if RUNS[run].quick}
     steppers = AuditSteppers(simulate, fast.trajectory, fast.flow)
     evidence = ClaimEvidence(samples, steppers, predict=CACHED, threads=1)
     with pytest.MonkeyPatch.context() as patch:
@@ -388,6 +389,21 @@ def test_a_number_that_is_off_by_what_a_claim_detects_changes_its_verdict(name):
     if claim.expected == "misprint":
         as_printed = [one.right() if one.check.form == "printed" else one.check for one in made]
         assert verdict_of(claim, as_printed) == "confirmed"
+
+
+@pytest.mark.parametrize("name", deep_among(claim_numbers.CLAIMS, "X7", "C10"))
+def test_what_a_claim_compares_is_what_its_words_say(name):
+    """Values, errors, expectations and bands, computed here from the samples and the theory."""
+    simulate = fast.simulate if name in REAL else adiabatic_particles.simulate
+    numbers = claim_numbers.Numbers(lambda run: sample_of(run, simulate), CACHED)
+    n_known = 0
+    for one in recorded(name):
+        wanted = numbers.of(name, one.check.what)
+        n_known += wanted is not None
+        for field, number in (wanted or {}).items():
+            found = one.given[2] if field == "expected" else getattr(one.check, field)
+            assert float(found) == pytest.approx(number, rel=1e-6, abs=1e-12), (field, one.check)
+    assert n_known >= claim_numbers.CLAIMS[name]
 
 
 def paths(change):

@@ -405,7 +405,6 @@ def test_followers_of_the_benchmark_go_the_same_way():
             assert [mine.x, mine.y, mine.vx, mine.vy] == pytest.approx(
                 [float(right.x), float(right.y), float(right.vx), float(right.vy)], rel=1e-9
             )
-    assert isinstance(solvers.Effort(*bench.REPEATS.values(), 1.0), tuple)
 
 
 def test_numbers_of_a_page_have_a_dash_where_there_is_none():

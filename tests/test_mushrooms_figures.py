@@ -237,6 +237,7 @@ def test_exponents_are_those_of_the_stretches_with_their_errors(monkeypatch):
         assert (last.y.tolist(), last.errors) == ([one.exponent], pytest.approx(one.error))
         assert last.x == pytest.approx(32, rel=0.05)
     assert axes.get_xscale() == "log"
+    assert any(xy(one)[1].tolist() == [0, 0] for one in axes.lines)  # an island falls to 0
     assert axes.get_title().startswith("frozen-mushroom: 2 particles from E0 = ")
 
 
@@ -250,18 +251,20 @@ def test_an_animation_shows_the_particle_where_it_is(moving, monkeypatch):
             shown.append((times[k], np.column_stack(xy(trail)), np.ravel(xy(dot)), axes.get_title()))
 
     monkeypatch.setattr(tables, "write_frames", look)
-    orbit = moving[0]
-    pictures.write_animation(orbit, io.BytesIO(), 7)
-    states = orbit.states()
-    assert [t for t, *_ in shown] == pytest.approx(np.linspace(states[0, 0], states[-1, 0], 7))
-    for t, trail, dot, title in shown:
-        place = [np.interp(t, states[:, 0], states[:, k]) for k in (1, 2)]
-        assert dot == pytest.approx(place)
-        assert trail[-1] == pytest.approx(place)
-        done = np.count_nonzero(states[:, 0] <= t)
-        before = states[max(0, done - 1 - pictures.TRAIL) : done, 1:3]
-        assert trail[:-1] == pytest.approx(before)
-        assert title.endswith(f"t/T = {(t - states[0, 0]) / MOVING.period:.2f}")
+    for orbit in (moving[0], orbits.follow(load("frozen-mushroom"), 9, seed=1)[0]):
+        shown.clear()
+        pictures.write_animation(orbit, io.BytesIO(), 7)
+        states, period = orbit.states(), orbit.scene.period
+        assert [t for t, *_ in shown] == pytest.approx(np.linspace(states[0, 0], states[-1, 0], 7))
+        for t, trail, dot, title in shown:
+            place = [np.interp(t, states[:, 0], states[:, k]) for k in (1, 2)]
+            assert dot == pytest.approx(place)
+            assert trail[-1] == pytest.approx(place)
+            done = np.count_nonzero(states[:, 0] <= t)
+            before = states[max(0, done - 1 - pictures.TRAIL) : done, 1:3]
+            assert trail[:-1] == pytest.approx(before)
+            passed = t - states[0, 0]
+            assert title.endswith(f" t/T = {passed / period:.2f}" if period else f" t = {passed:.2f}")
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "frozen-mushroom"])
@@ -338,6 +341,9 @@ def test_what_is_gathered_is_of_all_blocks(n_blocks):
     narrow = energies.gathered(kept[:50, 0])
     assert len(narrow.edges) == 41  # few particles, few bars
     assert narrow.edges[0] < kept[:50, 0].min() < kept[:50, 0].max() < narrow.edges[-1]
+    alike = energies.gathered(np.full(50, 0.1))
+    assert (np.diff(alike.edges) > 0).all()
+    assert alike.counts.sum() == 50
 
 
 def test_blocks_are_gathered_until_the_bars_can_be_placed(monkeypatch):
@@ -391,6 +397,34 @@ def test_growth_without_theory_is_the_simulation_alone():
     gains = np.random.default_rng(2).normal(0, 1e-3, (50, 3))
     above, below = energies.growth(CAP, 1e4, gains).axes
     assert not any("theory" in name for axes in (above, below) for name in labels(axes))
+
+
+def test_a_cycle_that_begins_at_a_narrow_mouth_has_no_theory():
+    """Some particles start in the island: theory's limit is not theirs."""
+    late = scenes.Mushroom(r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (), (0.4,)), slope=0.0)
+    s = np.random.default_rng(1).normal(0.0, 0.1, 50)
+    [axes] = energies.histogram(late, 1e6, s).axes
+    assert labels(axes) == ["simulation"]
+
+
+def test_residuals_are_all_within_their_panel():
+    """Large ones, too, to either side."""
+    for shift in (-0.02, 0.02):
+        s = np.random.default_rng(1).normal(shift, 0.01, 3000)
+        rest = energies.histogram(load("ergodic"), 1e6, s).axes[1]
+        left = xy(rest.lines[-1])[1]
+        assert rest.get_ylim()[0] < np.nanmin(left)
+        assert np.nanmax(left) < rest.get_ylim()[1]
+
+
+def test_many_points_are_drawn_finer(moving):
+    sizes = []
+    for found in (moving[:1], moving):
+        [axes] = pictures.collision_map(found).axes
+        sizes.append(
+            {one.get_markersize() for one in axes.lines if one.get_marker() == "." and len(xy(one)[0])}
+        )
+    assert max(sizes[1]) < min(sizes[0]) <= 4.5
 
 
 def test_bars_have_the_errors_of_their_counts():

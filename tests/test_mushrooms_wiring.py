@@ -328,8 +328,11 @@ def test_limits_stop_a_run_between_blocks(tmp_path, monkeypatch):
         conduct.complete(slow, engine, lambda _: None, max_seconds=15.0)
     assert slow.tally.particles < 6
     part = run_in("d")
-    conduct.complete(part, engine, lambda _: None, n_particles=3)
+    done: list[int] = []
+    conduct.complete(part, engine, done.append, n_particles=3)
     assert part.tally.particles == 4  # whole blocks
+    assert min(done) >= 0
+    assert done[-1] == 3  # of those that are asked for
     assert [one.number for one in part.lacking()] == [2]
 
 

@@ -418,6 +418,7 @@ def paths(change):
 
 VELOCITY, Y, VX = np.repeat([0, 1], [4, 2]), np.eye(6)[3], np.eye(6)[4]
 LEAKING = paths(lambda steps, n: steps * (1 + 1e-5 * n * VELOCITY))
+SLOWING = paths(lambda steps, n: steps * (1 - 1e-12 * n * VELOCITY))
 DEEPER = paths(lambda steps, n: steps * (1 + 1e-9 * Y))
 KICKED = paths(lambda steps, n: steps + 3.0 * (n + 1) * VX)  # more than any wall could give
 
@@ -439,6 +440,7 @@ def losing(scene, **options):
     ("name", "faults"),
     [
         ("L1", {"trajectory": LEAKING}),
+        ("L1", {"trajectory": SLOWING}),
         ("C6", {"trajectory": LEAKING}),
         ("M10", {"trajectory": DEEPER}),
         ("C5", {"trajectory": KICKED, "simulate": adiabatic_particles.simulate}),

@@ -96,6 +96,9 @@ def test_figures_are_those_of_the_sample_and_the_theory():
         assert check.error == pytest.approx(np.std(values) / len(values) ** 0.5, rel=2e-3)
         assert float(check.expected) == pytest.approx(wanted, rel=1e-8)
         assert check.band == pytest.approx(band)
+    assert found[SHARE].against == "nobody is captured"
+    assert found[SHARE].power == pytest.approx(1.0)
+    assert found["m1: mean of log E1/E0"].against == "no growth"
     width = found["width of their peak"]
     sigma = THEIRS.peak[1] ** 0.5
     assert (width.value, float(width.expected)) == (pytest.approx(free.std(ddof=1)), pytest.approx(sigma))
@@ -104,6 +107,16 @@ def test_figures_are_those_of_the_sample_and_the_theory():
     gap = nu_at(SCENE, RIGHT.t_out[RIGHT.captured]) - nu_at(SCENE, t_in)
     assert found[RELEASE].value == pytest.approx(gap.mean(), abs=1e-9)
     assert found[RELEASE].band == pytest.approx(4 * 2 * 1.5 / (2 * ENERGY) ** 0.5 * 0.4, rel=1e-3)
+
+
+def test_where_nobody_can_be_captured_no_rival_says_so():
+    theirs = expected(load("ergodic"), ENERGY)
+    s = theirs.draw(1, 500, 1)[:, 0]
+    given = GivenEnsemble(load("ergodic"), ENERGY, s, captured=np.zeros(500, bool), t_in=np.full(500, np.nan))
+    found = {check.what: check for check in checks(given, theirs)}
+    assert (found[SHARE].against, found[SHARE].power) == ("", None)
+    assert failing(list(found.values())) == []
+    assert likely_causes(given, theirs, wrongly("m1")) == []
 
 
 FEW = 19  # particles of which nothing is said

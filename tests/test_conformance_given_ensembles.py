@@ -493,7 +493,8 @@ def test_where_nothing_is_known_of_an_energy_a_failed_figure_is_open(tmp_path, m
     assert both.checks[-1].what.startswith("reversal identity")  # of two particles some shares have no error
 
 
-def test_sums_of_cycles_are_held_to_theory():
+def test_sums_of_cycles_are_held_to_theory(monkeypatch):
+    monkeypatch.setattr(audited, "MOST_DRAWN", 60_000)
     sums = theory.at_energy(SCENE, ENERGY).draw(3, 3000, 7)
     given = GivenEnsemble(SCENE, ENERGY, sums[:, 0], later=sums[:, 1:])
     found = {check.what: check for check in checks(given, THEIRS)}

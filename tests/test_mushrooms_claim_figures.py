@@ -28,8 +28,8 @@ from scene import load
 from scene.laws import value
 from scene.tables import laws
 
-N = 300  # particles of a run
-N_DRAWN = 20_000  # sums of cycles
+N = 250  # particles of a run
+N_DRAWN = 6_000  # sums of cycles
 PICTURES = {picture.claim: picture for picture in by_claim.ALL}
 
 

@@ -397,10 +397,13 @@ def test_columns_have_the_names_that_people_give_them(tmp_path):
 
 
 def test_rows_of_another_start_are_left_out_and_told(tmp_path):
-    rows = "E0,E1\n" + "1e6,2e6\n" * 3 + "1000000.5,3e6\n2e6,3e6\n2e6,4e6\n"
+    rows = "E0,E1\n" + "1e6,2e6\n" * 3 + "1000000.5,3e6\n2e6,3e6\n5e5,4e6\n"
     given, notes = read(tmp_path, rows, energy=1e6)
     assert len(given.s) == 4  # one was written in few digits
     assert "2 rows of another E0 are left out" in notes
+    for other in ("2e6", "5e5"):
+        line = one_line(read, tmp_path, f"E0,E1\n1e6,2e6\n{other},3e6\n", energy=None)
+        assert f"1e+06 and {float(other):g} among them" in line
 
 
 @pytest.mark.parametrize(("end", "is_short"), [("", True), ("1e6,2000000.0000001\n", False)])

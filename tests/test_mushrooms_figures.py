@@ -171,6 +171,9 @@ def test_a_table_without_a_mouth_has_hits_of_one_kind():
     ):
         assert as_rows(np.vstack(list(points_drawn(figure.axes[0]).values()))) == as_rows(points)
         assert labels(figure.axes[0]) == [f"{len(points)} {what}"]
+    [orbit] = orbits.follow(CAP, seed=1, energy=500.0, n_cycles=2)
+    [axes] = pictures.section(orbit, 0.25).axes
+    assert labels(axes) == ["2 hits"]  # the first one after the phase of each cycle
 
 
 def test_the_boundary_map_has_every_collision_and_the_walls_in_their_slots(moving):
@@ -214,6 +217,10 @@ def test_the_energy_in_time_stands_beside_theory_and_captures_are_shaded(moving)
     assert is_shaded[1:-1][captured[:-3] & captured[1:-2] & captured[2:-1]].all()
     assert is_shaded.any()
     assert axes.get_xlabel() == "t / T"
+    [still] = orbits.follow(load("frozen-mushroom"), 9, seed=1)
+    [axes] = pictures.energy_in_time(still).axes
+    assert axes.get_xlabel() == "t [time]"
+    assert xy(line(axes, "this particle"))[0] == pytest.approx(still.states()[:, 0])
 
 
 def test_exponents_are_those_of_the_stretches_with_their_errors(monkeypatch):
@@ -316,6 +323,17 @@ def test_a_gif_has_the_walls_of_each_frame(name, monkeypatch):
     assert getattr(picture, "n_frames", 1) == len(times)
     assert picture.size[1] == tables.HIGHEST
     assert tables.HIGHEST <= picture.size[0] <= tables.WIDEST
+
+
+def test_a_table_that_stands_still_is_drawn_once_whatever_room_there_is():
+    for height in (2.0, 6.0, 60.0):
+        figure = tables.new_strip(load("frozen-mushroom"), 7.2, height)
+        assert len(figure.axes) == 1
+        assert figure.get_figheight() <= height
+    low, high = (tables.new_strip(MOVING, 7.2, height) for height in (2.0, 60.0))
+    rows = [len({round(axes.get_subplotspec().rowspan.start, 3) for axes in one.axes}) for one in (low, high)]
+    assert rows == [1, 2]  # in two rows if the height permits
+    assert low.get_figheight() <= 2.0
 
 
 def test_phases_are_even_in_one_cycle():

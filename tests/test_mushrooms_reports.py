@@ -29,7 +29,7 @@ from conformance.suite import Result, Run
 from conformance.suite.result import Speed
 from conformance.suite.session import Limits
 from fast.batch import careful_steps, fine_steps, lane_steps
-from mushrooms import audit_ensemble, bench
+from mushrooms import audit_ensemble, bench, check
 from mushrooms.figures import style
 from mushrooms.reports import bench_page, check_page
 from mushrooms.reports.page import number, pull
@@ -420,3 +420,55 @@ def test_numbers_of_a_page_have_a_dash_where_there_is_none():
 
 def check_of(value, error, expected):
     return Check("a number", True, str(expected), value, error)
+
+
+def shown_on_a_terminal(capsys, monkeypatch, run: Run) -> str:
+    monkeypatch.setenv("COLUMNS", "200")
+    check.show(run)
+    return capsys.readouterr().out
+
+
+def test_a_run_is_shown_with_its_counts_and_why_it_fails(capsys, monkeypatch):
+    taught = [
+        a_result(f"cap/{k}", "fail", f"x is off by {k}", expected={"outcome": "collision", "x": 1.5},
+                 given={"outcome": "collision", "x": k + 0.5}, asked="mirrored", paste=f"def test_{k}(): ...")
+        for k in range(7)
+    ]  # fmt: skip
+    sent = [a_result(f"protocol/{k}", "crashed", "gone", sent=k * "x") for k in (0, 500, 501)]
+    stderr = "\n".join(["", *(f"line {k}" for k in range(9)), " "])
+    speed = Speed("moving-cap", 10, 3, 250.0, 300.0)
+    more = {"diagnosis": ["like a mutant: stale"], "stderr": stderr, "n_restarts": 2, "speed": speed}
+    run = a_run(*GOOD, *taught, *sent, **more)
+    text = shown_on_a_terminal(capsys, monkeypatch, run)
+    for k in range(7):
+        is_taught = k < 5
+        assert (f"cap/{k}, asked mirrored; mushrooms ask cap/{k} --seed 1 prints it" in text) is is_taught
+        assert (f"  given     collision x={k + 0.5}" in text) is is_taught
+        assert (f"def test_{k}(): ..." in text) is is_taught
+    assert "  certified collision x=1.5" in text
+    assert "protocol/0, sent last" not in text  # nothing was sent
+    assert f"protocol/500, sent last: {500 * 'x'}\n" in text
+    assert f"protocol/501, sent last: {500 * 'x'}... (--json FILE has it whole)\n" in text
+    assert "Its standard error ends:\n  line 3\n" in text
+    assert "line 2\n" not in text
+    assert "like a mutant: stale" in text
+    assert "Speed on moving-cap: 250 ns per collision, best of 3 x 10." in text
+    assert "3 of 13 cases pass, 2 restarts, 41.6 s." in text
+    assert f"not accepted: {run.scope()}" in text
+    assert "900" in text  # the worst ulps
+
+
+def test_a_good_run_is_shown_without_objections(capsys, monkeypatch):
+    known = a_result(
+        "cap/9", "fail", "as it is", is_known=True, expected={"outcome": "x"}, paste="no", sent="no"
+    )
+    profile = a_result("profile/time", "pass", "it takes long")
+    text = shown_on_a_terminal(capsys, monkeypatch, a_run(*GOOD, known, profile, stderr="noise"))
+    assert "accepted: core 9.9; cap; step" in text
+    assert "profile/time: it takes long." in text
+    for word in ("noise", "certified", "as a test", "sent last", "and 1 more"):
+        assert word not in text
+    many = [a_result(f"cap/{k}", "fail", "wrong") for k in range(23)]
+    text = shown_on_a_terminal(capsys, monkeypatch, a_run(*GOOD, *many))
+    assert "... and 3 more: --json FILE has them all." in text
+    assert text.count(": fail: wrong") == 20

@@ -29,7 +29,7 @@ import theory
 from mushrooms import bench, draw, main, orbits, output, questions, scenes as listing, simulate
 from mushrooms.figures import energies, orbits as pictures, style, table
 from mushrooms.reports import bench_page
-from mushrooms.store import conduct, run as stored, spec
+from mushrooms.store import conduct, run as stored, spec, summary
 from mushrooms.store.run import BlockRange
 from mushrooms.store.spec import LANES, RunSpec, shape_of
 from mushrooms.store.summary import careful_note, gain_of, tally_of
@@ -362,6 +362,12 @@ def test_gains_of_blocks_have_the_mean_of_all():
     assert found.standard_error == pytest.approx(gains[:, -1].std(ddof=1) / 50**0.5)
     assert gain_of(lambda: [gains[:1]]).standard_error is None
     assert gain_of(lambda: [gains[:0]]) == (0, None, None)
+
+
+def test_a_share_of_all_or_none_has_an_error_as_if_one_more_could_tell():
+    for share, wanted in ((0.5, 0.25), (1.0, 0.1 * 0.9), (0.0, 0.1 * 0.9), (0.05, 0.1 * 0.9)):
+        assert summary._measured_error(load("moving-cap"), share, 9) == pytest.approx((wanted / 9) ** 0.5)
+    assert summary._measured_error(load("ergodic"), 1.0, 9) == 0.0  # no particle can be captured
 
 
 @pytest.mark.parametrize(

@@ -138,6 +138,10 @@ def test_what_is_not_told_is_not_asked():
     whats = {check.what for check in checks(alone, THEIRS)}
     assert TIMES in whats
     assert RELEASE not in whats
+    x, y = uniform_starts()
+    for half in ({"x0": x}, {"y0": y}):
+        whats = {check.what for check in checks(RIGHT._replace(**half), THEIRS)}
+        assert whats.isdisjoint((STARTS, OUTWARD))
 
 
 def uniform_starts(n: int = 3000):

@@ -468,6 +468,13 @@ def test_a_good_run_is_shown_without_objections(capsys, monkeypatch):
     assert "profile/time: it takes long." in text
     for word in ("noise", "certified", "as a test", "sent last", "and 1 more"):
         assert word not in text
+    for result, is_told in (
+        (a_result("cap/9", "fail", "off"), False),  # what it wrote says nothing of a wrong number
+        (a_result("cap/9", "crashed", "gone"), True),
+        (a_result("protocol/stop", "fail", "it goes on"), True),
+    ):
+        text = shown_on_a_terminal(capsys, monkeypatch, a_run(*GOOD, result, stderr="noise"))
+        assert ("Its standard error ends:\n  noise" in text) is is_told
     many = [a_result(f"cap/{k}", "fail", "wrong") for k in range(23)]
     text = shown_on_a_terminal(capsys, monkeypatch, a_run(*GOOD, *many))
     assert "... and 3 more: --json FILE has them all." in text

@@ -36,7 +36,7 @@ WALLS = {
 @pytest.fixture(scope="module")
 def moving() -> list[orbits.FollowedOrbit]:
     """Return orbits of some cycles: free ones, and such as are captured on the way."""
-    return orbits.follow(MOVING, 400, energy=2e3, seed=3, n_orbits=4)
+    return orbits.follow(MOVING, 200, energy=1e3, seed=3, n_orbits=4)
 
 
 def drawn_walls(axes, scene, t) -> list:
@@ -124,11 +124,12 @@ def test_a_section_shows_every_hit_of_the_arc_captured_ones_apart(moving, phase)
         captured += rows[is_captured].tolist()
         free += rows[~is_captured].tolist()
     found = points_drawn(axes)
-    assert as_rows(found[pictures.CAPTURED]) == as_rows(captured)
-    assert as_rows(found[pictures.FREE]) == as_rows(free)
     said = labels(axes)
-    assert f"captured, {len(captured):,} hits" in said
-    assert f"free, {len(free):,} hits" in said
+    for colour, name, rows in ((pictures.CAPTURED, "captured", captured), (pictures.FREE, "free", free)):
+        assert as_rows(found.get(colour, [])) == as_rows(rows)
+        assert (f"{name}, {len(rows):,} hits" in said) is bool(rows)
+    assert captured or phase
+    assert free
     lowest, highest = 0.2, 1.0
     if phase is not None:  # nu = .6 + .4 cos t
         lowest = highest = 0.6 + 0.4 * math.cos(start_time(MOVING) + phase * MOVING.period)
@@ -193,7 +194,7 @@ def test_the_boundary_map_has_every_collision_and_the_walls_in_their_slots(movin
 
 
 def test_the_energy_in_time_stands_beside_theory_and_captures_are_shaded(moving):
-    orbit = next(one for one in moving if 5 < np.count_nonzero(one.captured()) < 395)
+    orbit = next(one for one in moving if 5 < np.count_nonzero(one.captured()) < 195)
     [axes] = pictures.energy_in_time(orbit).axes
     states = orbit.states()
     time = (states[:, 0] - states[0, 0]) / MOVING.period
@@ -304,7 +305,8 @@ def test_a_strip_shows_the_table_at_each_phase_with_chords_between_its_walls(nam
 @pytest.mark.parametrize("name", ["moving-cap", "frozen-mushroom"])
 def test_a_gif_has_the_walls_of_each_frame(name, monkeypatch):
     scene, frames = load(name), []
-
+    monkeypatch.setattr(tables, "WIDEST", 480)  # small pictures are quick
+    monkeypatch.setattr(tables, "HIGHEST", 270)
     axes = tables.new_slide(scene)
     draw = axes.figure.canvas.draw
 
@@ -326,7 +328,7 @@ def test_a_gif_has_the_walls_of_each_frame(name, monkeypatch):
 
 
 def test_a_table_that_stands_still_is_drawn_once_whatever_room_there_is():
-    for height in (2.0, 6.0, 60.0):
+    for height in (2.0, 60.0):
         figure = tables.new_strip(load("frozen-mushroom"), 7.2, height)
         assert len(figure.axes) == 1
         assert figure.get_figheight() <= height

@@ -643,3 +643,16 @@ def test_a_picture_of_a_step_begins_where_the_step_does(monkeypatch):
         assert given == as_data[1 + at]
     rest = {**data, "state": {**as_data[0], "x": 0.0, "y": 5.0}}
     assert "--picture: step 1 from" in one_line(questions._draw, rest, 0)
+
+
+def test_hits_are_counted_where_a_flow_is_decided(monkeypatch):
+    """Of one that ends undecided, or is refused, there is nothing to count."""
+    scene, start = load("moving-cap"), scenes.State(0.0, 0.1, 0.2, 30.0, 40.0)
+    found = questions.count_hits(scene, start, 0.5)
+    walls = fast.trajectory(scene, start, 1000, 0.5).walls
+    assert found == {wall: walls.count(wall) for wall in scene.walls}
+    assert questions.count_hits(scene, start, -1.0) is None
+    carried = fast.flow(scene, [start], 0.5)
+    open_end = carried._replace(outcomes=(scenes.Undecided("shy"),))
+    monkeypatch.setattr(fast, "flow", lambda *_: open_end)
+    assert questions.count_hits(scene, start, 0.5) is None

@@ -11,7 +11,7 @@ import fast
 import theory
 from conformance.audit import runs
 from conformance.audit.claim import Check, Claim, ClaimEvidence, Finding, from_data, to_data, verdict_of
-from conformance.audit.claims import experiments
+from conformance.audit.claims import assumptions, experiments
 from conformance.audit.runs import RUNS, Sample, Simulation, run_seed
 from conformance.audit.session import AuditResult, AuditSettings, examine
 from conformance.audit.tolerances import (
@@ -283,3 +283,10 @@ def test_evidence_has_the_theory_and_the_runs_of_its_size():
     assert asked == [(load("ergodic"), 30)] * 2
     assert evidence.theory_of(SimpleNamespace(run=RUNS["ergodic@1e7"])) == "theory"
     assert theory.predict(load("ergodic"), 5).p_nc == 1
+
+
+def test_chords_are_counted_up_to_the_rim_and_what_rounding_puts_beyond_it():
+    """The area in phase of the chords nearer to the centre than s: half of it is s sqrt(1 - s^2) + asin s."""
+    s = np.array([0.0, 0.5, 1.0, 1 + 1e-15])
+    wanted = [0.0, 0.5 * 0.75**0.5 + math.pi / 6, math.pi / 2, math.pi / 2]
+    assert assumptions._chords(s) == pytest.approx(wanted)

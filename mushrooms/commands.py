@@ -287,7 +287,7 @@ def export(
 
     The run is read block by block and its checksums are tested. A damaged run is refused.
     """
-    from mushrooms.store.run import export_run
+    from mushrooms.store.export import export_run
 
     export_run(run, to)
 
@@ -461,7 +461,7 @@ def verify(
 ) -> int:
     """Check a trajectory computed in floating point. Each step is judged from the state before it.
 
-    Exit code 0 if every step is proved, 1 if one is not, 2 on bad input.
+    Exit code 0 if every step is within the bound of errors, 1 if one is not or is open, 2 on bad input.
     """
     from mushrooms.questions import verify_file
 

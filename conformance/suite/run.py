@@ -233,7 +233,7 @@ def read_known(path: Path) -> frozenset[str]:
     """Read a known-failures file: one name a line, # begins a comment.
 
     A name is a case's id; ID@SEED for the run of one seed, which a fresh question needs; fresh/* for all of
-    these, which may pass; declined/GROUP or declined/all where too much is declined.
+    these, which may pass; declined/GROUP or declined/all where too many vectors are declined.
 
     Raises:
         BadInput: naming the line whose name the suite does not have, or that comes twice.
@@ -244,7 +244,7 @@ def read_known(path: Path) -> frozenset[str]:
         raise BadInput(f"known failures {str(path)!r} cannot be read: {error}") from None
     corpus = vectors.load("stress")
     names = {vector.id for vector in corpus} | set(OTHER_CASES) | {f"{FRESH}/*"}
-    names |= {f"declined/{group}" for group in ("all", *OTHER_GROUPS, *(v.group for v in corpus))}
+    names |= {f"declined/{group}" for group in ("all", FRESH, *(v.group for v in corpus))}
     drawn = {f"{FRESH}/{number}" for number in range(1, max(N_FRESH.values()) + 1)}
     found: set[str] = set()
     for number, line in enumerate(lines, 1):

@@ -283,6 +283,9 @@ UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 ANSWERS = {"step": Answered, "trajectory": Steps, "flow": Flown, "time": Timed}
 
 
+MAX_OFFERED = 100  # names of profiles, tables or laws that are kept of an introduction
+
+
 class _Envelope(msgspec.Struct):
     seq: Any = None
     outcome: Any = None
@@ -305,9 +308,8 @@ def read_introduction(line: bytes) -> Introduction:
             "wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}"
         )
     texts = {name: clean(getattr(introduction, name)) for name in ("name", "version", "language")}
-    offered = {
-        name: tuple(map(clean, getattr(introduction, name))) for name in ("profiles", "tables", "laws")
-    }
+    lists = {name: getattr(introduction, name) for name in ("profiles", "tables", "laws")}
+    offered = {name: tuple(map(clean, given[:MAX_OFFERED])) for name, given in lists.items()}
     return msgspec.structs.replace(introduction, **texts, **offered)
 
 

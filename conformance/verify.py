@@ -29,8 +29,6 @@ the reason of a rejection. A scene counts as refused where `scene.from_data` ref
 laws of both kinds meet in one condition: that one refuses what touches, or nearly.
 """
 
-from __future__ import annotations
-
 import itertools
 import json
 import re
@@ -101,22 +99,22 @@ class Interval:
         """Keep the ends as they are."""
         self.lo, self.hi, self.exp, self.bits = lo, hi, exp, bits
 
-    def __add__(self, other: Interval) -> Interval:
+    def __add__(self, other: "Interval") -> "Interval":
         """Return all sums."""
         exp = min(self.exp, other.exp)
         up, other_up = self.exp - exp, other.exp - exp
         lo, hi = (self.lo << up) + (other.lo << other_up), (self.hi << up) + (other.hi << other_up)
         return rounded(lo, hi, exp, self.bits)
 
-    def __neg__(self) -> Interval:
+    def __neg__(self) -> "Interval":
         """Return all numbers with the other sign."""
         return Interval(-self.hi, -self.lo, self.exp, self.bits)
 
-    def __sub__(self, other: Interval) -> Interval:
+    def __sub__(self, other: "Interval") -> "Interval":
         """Return all differences."""
         return self + -other
 
-    def __mul__(self, other: Interval | int) -> Interval:
+    def __mul__(self, other: "Interval | int") -> "Interval":
         """Return all products."""
         if isinstance(other, int):
             other = Interval(other, other, 0, self.bits)
@@ -124,7 +122,7 @@ class Interval:
         products = (a * c, a * d, b * c, b * d)
         return rounded(min(products), max(products), self.exp + other.exp, self.bits)
 
-    def __truediv__(self, other: Interval) -> Interval:
+    def __truediv__(self, other: "Interval") -> "Interval":
         """Return all quotients.
 
         Raises:
@@ -136,7 +134,7 @@ class Interval:
         lo, hi = min(a // b for a, b in pairs), max(-(-a // b) for a, b in pairs)
         return rounded(lo, hi, self.exp - other.exp - up, self.bits)
 
-    def __pow__(self, power: int) -> Interval:
+    def __pow__(self, power: int) -> "Interval":
         """Return all squares. `power` is 2: where 0 is inside, the least square is 0."""
         ends = self.lo**power, self.hi**power
         return rounded(min(ends) if self.sign else 0, max(ends), power * self.exp, self.bits)
@@ -147,12 +145,12 @@ class Interval:
         return (self.lo > 0) - (self.hi < 0)
 
     @property
-    def low(self) -> Interval:
+    def low(self) -> "Interval":
         """Return the lower end, a point."""
         return Interval(self.lo, self.lo, self.exp, self.bits)
 
     @property
-    def high(self) -> Interval:
+    def high(self) -> "Interval":
         """Return the upper end, a point."""
         return Interval(self.hi, self.hi, self.exp, self.bits)
 
@@ -162,7 +160,7 @@ class Interval:
         up, down = 1 << max(self.exp, 0), 1 << max(-self.exp, 0)
         return Fraction(self.lo * up, down), Fraction(self.hi * up, down)
 
-    def cut(self) -> Interval:
+    def cut(self) -> "Interval":
         """Return a point inside, near the middle: not the middle, where a root may well lie.
 
         An interval too narrow to cut gives its lower end.
@@ -170,7 +168,7 @@ class Interval:
         point = (self.low + (self.high - self.low) * number(SHARE, self.bits)).low
         return point if is_below(self.low, point) else self.low
 
-    def simplest(self) -> Interval:
+    def simplest(self) -> "Interval":
         """Return a point inside that has few digits: a root that has few is then found exactly.
 
         It is the first multiple of 2^up above lo, and 2^up <= hi - lo.
@@ -181,7 +179,13 @@ class Interval:
 
 
 def rounded(lo: int, hi: int, exp: int, bits: int) -> Interval:
-    """Return an interval rounded outward to so many digits."""
+    """Return an interval rounded outward to so many digits.
+
+    The number 0 gets the exponent 0. Exponents of products add up, and no digit of 0 would ever be
+    rounded away: over a long path its exponent would fall without end.
+    """
+    if lo == hi == 0:
+        return Interval(0, 0, 0, bits)
     extra = max(0, max(lo.bit_length(), hi.bit_length()) - bits)
     return Interval(lo >> extra, -(-hi >> extra), exp + extra, bits)
 
@@ -423,11 +427,12 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
 def exact_jet(scene: Scene, time: Fraction, rate: int, name: str) -> Jet:
     """Return a law and its derivatives just after a time, as rationals.
 
-    Waves are taken at phase 0 only, where cosine is 1 and sine is 0: at time 0, and after whole
-    multiples of a rational period. There omega is irrational, and `rate` stands for it.
+    A wave is taken at whole quarters of its turn only. There cosine and sine are 0, 1 or -1. The
+    phase of wave k is 0 at time 0. Where the scene has a period, it is k time / period turns. There
+    omega is irrational, and `rate` stands for it.
 
     Raises:
-        Unproved: the law is not known to be rational.
+        Unproved: a wave is not at a whole quarter of its turn.
     """
     law = scene.laws[name]
     if law.legs:
@@ -436,12 +441,29 @@ def exact_jet(scene: Scene, time: Fraction, rate: int, name: str) -> Jet:
         leg = next(leg for leg in law.legs if at < leg.end)
         slope = leg.bend * (at - leg.origin)
         return Jet(leg.c + slope * (at - leg.origin) / 2, slope, leg.bend)
-    is_whole = scene.period is not None and (time / scene.period).denominator == 1
+    waves = [
+        quarter(scene, k * time) if any(factors) else QUARTERS[0]
+        for k, factors in enumerate(law.waves, 1)
+    ]
+    return wave_jet(law, waves, scene.omega or Fraction(rate), Fraction)
+
+
+# Cosine and sine after 0, 1, 2 and 3 quarters of a turn.
+QUARTERS = ((1, 0), (0, 1), (-1, 0), (0, -1))
+
+
+def quarter(scene: Scene, time: Fraction) -> tuple[int, int]:
+    """Return cosine and sine of the phase at a time, where it is a whole number of quarter turns.
+
+    Raises:
+        Unproved: it is not.
+    """
+    quarters = 4 * time / scene.period if scene.period else Fraction(0)
     require(
-        not law.waves or time == 0 or is_whole,
+        quarters.denominator == 1 and (scene.period or time == 0),
         Unproved("a law is not known to be rational at this time"),
     )
-    return wave_jet(law, [(1, 0)] * len(law.waves), scene.omega or Fraction(rate), Fraction)
+    return QUARTERS[quarters.numerator % 4]
 
 
 # 3. Walls
@@ -784,9 +806,11 @@ class Flight:
         length = number(min(lengths, default=Fraction(1)) * (1 - Fraction(8, self.bits)), 32).high
         if self.clock.turn and not speed:
             last = min(last, (self.begin + self.clock.turn).high, key=lambda point: point.ends)
-        while lengths and is_below(stop := (start + length).high, last):
+        stop = (start + length).high
+        while lengths and is_below(stop, last):
             yield start, stop
             start, length = stop, length * 4
+            stop = (start + length).high
         yield start, self.beyond(start, last)
 
     def beyond(self, start: Interval, stop: Interval) -> Interval:
@@ -1151,7 +1175,8 @@ def walk(scene: Scene, state: State, t_end: Fraction, bits: int) -> Iterator[Ste
         Unproved: this precision cannot tell what comes next.
     """
     flight, in_cap = start(scene, state, t_end, bits)
-    while hit := flight.event(in_cap=in_cap):
+    hit = flight.event(in_cap=in_cap)
+    while hit:
         numbers, later = bounce(flight, hit)
         (_, _, vx, vy), excess = flight.line, None
         if hit[0] == "arc" and scene.table == "mushroom":
@@ -1159,6 +1184,7 @@ def walk(scene: Scene, state: State, t_end: Fraction, bits: int) -> Iterator[Ste
             excess = (numbers["x"] * vy - numbers["y"] * vx) ** 2 - width**2 * (vx**2 + vy**2)
         yield Step(hit[0], numbers, excess)
         flight, in_cap = later, scene.table != "stem" and hit[0] in ("arc", "base")
+        hit = flight.event(in_cap=in_cap)
     end, (x, y, vx, vy) = number(flight.end, bits), flight.line
     numbers = {"dt": end - flight.begin, "x": x + vx * end, "y": y + vy * end, "vx": vx, "vy": vy}
     yield Step(None, numbers)

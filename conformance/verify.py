@@ -29,25 +29,37 @@ the reason of a rejection. A scene counts as refused where `scene.from_data` ref
 laws of both kinds meet in one condition: that one refuses what touches, or nearly.
 """
 
+import argparse
+import csv
+import io
 import itertools
 import json
+import os
 import re
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache, partial, reduce
 from math import floor, inf
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
+
+if sys.version_info < (3, 10):  # noqa: UP036 - people run this file alone
+    sys.stderr.write("verify.py needs Python 3.10 or later\n")
+    sys.exit(2)
 
 PRECISIONS = (128, 256, 512, 1024, 2048, 4096)  # bits, tried in turn
-WORK = 200_000  # units of work for a line, of some 60 microseconds each: about 12 seconds in all
+WORK = 480_000  # units of work for a line, of some 25 microseconds each: about 12 seconds in all
 SHARE = Fraction(61, 128)  # where a stretch is cut: not in the middle, where a root may well lie
 NEAR = Fraction(1, 2**20)  # how far from its wall a state may lie, as a share of the wall's size
 LATE, LARGE = 2**30, Fraction(10**100)  # t in periods, or a number, from which one may refuse
 UNIT = Fraction(1, 2**53)  # unit roundoff of binary64: half a unit in the last place, relative
 BEYOND = Fraction(3, 2**12)  # how far past its end a search goes, as a share of its length
-WRONG = Fraction(1, 10**9)  # --answers: relative backward error beyond which a step is false
+WITHIN = 1e-9 * 2.0**53  # --answers: backward error, in ulps, beyond which a step is false
+TICKS = 2  # --answers: last places by which the time of an answer may be off, however short dt is
+FAR = 1e300  # --answers: the horizon of a path that has none
+PULSE = 5  # --answers: seconds between two lines of progress
+LARGEST = sys.float_info.max
 SIDES = ("left", "right", "floor")
 WALLS = {"cap": ("arc", "base"), "stem": ("base", *SIDES), "mushroom": ("arc", "base", *SIDES)}
 FIELDS = ("t", "x", "y", "vx", "vy")  # of a state, and of an answer in floating point
@@ -101,6 +113,10 @@ class Interval:
 
     def __add__(self, other: "Interval") -> "Interval":
         """Return all sums."""
+        if other.lo == other.hi == 0:
+            return self
+        if self.lo == self.hi == 0:
+            return rounded(other.lo, other.hi, other.exp, self.bits)
         exp = min(self.exp, other.exp)
         up, other_up = self.exp - exp, other.exp - exp
         lo, hi = (self.lo << up) + (other.lo << other_up), (self.hi << up) + (other.hi << other_up)
@@ -118,7 +134,11 @@ class Interval:
         """Return all products."""
         if isinstance(other, int):
             other = Interval(other, other, 0, self.bits)
+        if self.lo == self.hi == 0 or other.lo == other.hi == 0:
+            return Interval(0, 0, 0, self.bits)
         a, b, c, d = self.lo, self.hi, other.lo, other.hi
+        if a >= 0 and c >= 0:
+            return rounded(a * c, b * d, self.exp + other.exp, self.bits)
         products = (a * c, a * d, b * c, b * d)
         return rounded(min(products), max(products), self.exp + other.exp, self.bits)
 
@@ -212,11 +232,9 @@ def join(*parts: Interval) -> Interval:
 
 
 def is_below(one: Interval, other: Interval) -> bool:
-    """Tell whether every number of one interval is less than every number of another.
-
-    Rounding outward never changes the sign of a difference of two points.
-    """
-    return (other.low - one.high).sign > 0
+    """Tell whether every number of one interval is less than every number of another."""
+    exp = min(one.exp, other.exp)
+    return one.hi << (one.exp - exp) < other.lo << (other.exp - exp)
 
 
 @lru_cache(maxsize=64)
@@ -271,12 +289,25 @@ class Jet(NamedTuple):
     d1: Any
     d2: Any
 
+    def __add__(self, other: Any) -> "Jet":
+        """Return the sum."""
+        return Jet(self.f + other.f, self.d1 + other.d1, self.d2 + other.d2)
 
-def times(p: Jet, q: Jet) -> Jet:
-    """Return the product, by Leibniz' rule. A square (p is q) is enclosed more tightly, as one."""
-    if p is q:
-        return Jet(p.f**2, p.f * p.d1 * 2, (p.d1**2 + p.f * p.d2) * 2)
-    return Jet(p.f * q.f, p.d1 * q.f + p.f * q.d1, p.d2 * q.f + p.d1 * q.d1 * 2 + p.f * q.d2)
+    def __neg__(self) -> "Jet":
+        """Return the function with the other sign."""
+        return Jet(-self.f, -self.d1, -self.d2)
+
+    def __sub__(self, other: "Jet") -> "Jet":
+        """Return the difference."""
+        return self + -other
+
+    def __mul__(self, other: Any) -> "Jet":
+        """Return the product, by Leibniz' rule. A square is enclosed more tightly, as one."""
+        p, q = self, other
+        if p is q:
+            return Jet(p.f**2, p.f * p.d1 * 2, (p.d1**2 + p.f * p.d2) * 2)
+        d2 = p.d2 * q.f + p.d1 * q.d1 * 2 + p.f * q.d2
+        return Jet(p.f * q.f, p.d1 * q.f + p.f * q.d1, d2)
 
 
 class Leg(NamedTuple):
@@ -407,7 +438,7 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
     """
     exact = partial(number, bits=clock.bits)
     # With more digits only cosines cost much more.
-    clock.spend(len(law.waves) * (1 + clock.bits**2 // 2**18) + len(law.legs) // 16)
+    clock.spend(2 * len(law.waves) * (1 + clock.bits**2 // 2**18) + len(law.legs) // 8)
     if not law.legs:
         return wave_jet(law, clock.waves(s, len(law.waves)), clock.omega, exact)
     (low, high), first, jets = s.ends, law.legs[0].begin, []
@@ -468,30 +499,34 @@ def quarter(scene: Scene, time: Fraction) -> tuple[int, int]:
 
 # 3. Walls
 
-# f is a sum of products of laws and coordinates, each with its sign; f > 0 inside the table. The
-# base of a stem lies above the particle: "top". The last two are conditions, not walls: a scene is
-# valid while r - w >= 0, w - h slope > 0, and every law but the slope is > 0.
-TERMS: dict[str, tuple[tuple[Any, ...], ...]] = {
-    "arc": ((1, "r", "r"), (-1, "x", "x"), (-1, "y", "y")),
-    "base": ((1, "y"),),
-    "top": ((-1, "y"),),
-    "floor": ((1, "y"), (1, "h")),
-    "left": ((1, "w"), (1, "slope", "y"), (1, "x")),
-    "right": ((1, "w"), (1, "slope", "y"), (-1, "x")),
-    "r - w": ((1, "r"), (-1, "w")),
-    "w - h slope": ((1, "w"), (-1, "h", "slope")),
-}
-
 
 def wall_jet(scene: Scene, wall: str, law: Callable[[str], Jet], x: Jet, y: Jet) -> Jet:
-    """Return f of a wall along a flight, or a law; w = nu r where nu is given."""
-    name = "top" if (wall, scene.table) == ("base", "stem") else wall
-    place, products = {"x": x, "y": y}, []
-    for sign, *names in TERMS.get(name, ((1, name),)):
-        parts = ["nu", "r"] if names == ["w"] and "nu" in scene.laws else names
-        product = reduce(times, (place.get(part) or law(part) for part in parts))
-        products.append([part * sign for part in product])
-    return Jet(*(reduce(lambda p, q: p + q, parts) for parts in zip(*products, strict=True)))
+    """Return f of a wall along a flight; f > 0 inside the table.
+
+    The base of a stem lies above the particle. Other names are conditions, not walls: a scene is
+    valid while r - w >= 0, w - h slope > 0, and every law but the slope is > 0.
+    """
+    if wall == "arc":
+        r = law("r")
+        return r * r - x * x - y * y
+    if wall == "base":
+        return -y if scene.table == "stem" else y
+    if wall == "floor":
+        return y + law("h")
+    if wall == "left":
+        return width(scene, law) + law("slope") * y + x
+    if wall == "right":
+        return width(scene, law) + law("slope") * y - x
+    if wall == "r - w":
+        return law("r") - width(scene, law)
+    if wall == "w - h slope":
+        return width(scene, law) - law("h") * law("slope")
+    return width(scene, law) if wall == "w" else law(wall)
+
+
+def width(scene: Scene, law: Callable[[str], Jet]) -> Jet:
+    """Return w, half the width of the mouth: w = nu r where nu is given."""
+    return law("nu") * law("r") if "nu" in scene.laws else law("w")
 
 
 # 4. Where f > 0, and where it vanishes first
@@ -548,9 +583,11 @@ class Flight:
 
     def law(self, name: str, s: Interval) -> Jet:
         """Enclose a law over a stretch."""
-        key = name, s.lo, s.hi, s.exp
+        law = self.scene.laws[name]
+        # A law that never moves is the same over every stretch.
+        key = (name, s.lo, s.hi, s.exp) if law.waves or law.legs else (name, 0, 0, 0)
         if key not in self._laws:
-            self._laws[key] = law_jet(self.scene.laws[name], self.clock, s)
+            self._laws[key] = law_jet(law, self.clock, s)
         return self._laws[key]
 
     def f(self, wall: str, s: Interval) -> Jet:
@@ -582,7 +619,7 @@ class Flight:
         except Unproved:
             return False
 
-    def is_clear(self, wall: str, s: Interval) -> bool:
+    def is_clear(self, wall: str, s: Interval, jet: Jet, last: Interval) -> bool:
         """Tell whether f > 0 is proved on a stretch but at its left end, where f >= 0 is known.
 
         Then f > 0 at its right end, where the next stretch starts. f and f' are continuous, for
@@ -603,15 +640,15 @@ class Flight:
         prove this: the chord starts at 0, wherever the begin is. So does f'' > 0 if f' = 0 at the
         begin exactly (lifting, `is_flat`).
         """
-        jet, p = self.f(wall, s), s.simplest()
-        is_positive_at_end = self.f(wall, s.high).f.sign > 0
+        is_positive_at_end = last.sign > 0
         if jet.d1.sign > 0 or (jet.d2.hi <= 0 and is_positive_at_end):
             return True
         if self.holds_begin(wall, s):
             return bool(self.is_flat and jet.d2.sign > 0)
         if jet.f.sign > 0 or (jet.d1.sign < 0 and is_positive_at_end):
             return True
-        at, u, half = self.f(wall, p), s - p, number(Fraction(1, 2), self.bits)
+        p, half = s.simplest(), number(Fraction(1, 2), self.bits)
+        at, u = self.f(wall, p), s - p
         is_positive = (at.f + at.d1 * u + jet.d2 * u**2 * half).sign > 0
         return is_positive or all(self.is_never_met(wall, end, s) for end in (s.high, s.low))
 
@@ -661,12 +698,13 @@ class Flight:
         )
         parts = [join(start, stop)]
         while parts:
-            self.clock.spend(6)
+            self.clock.spend(6 + 6 * self.bits**2 // 2**20)
             part = parts.pop()
-            if self.is_clear(wall, part):
+            jet, last = self.f(wall, part), self.f(wall, part.high).f
+            if self.is_clear(wall, part, jet, last):
                 continue
             at_begin, cut = self.holds_begin(wall, part), part.cut()
-            falls = self.f(wall, part).d1.sign < 0 and self.f(wall, part.high).f.sign < 0
+            falls = jet.d1.sign < 0 and last.sign < 0
             if falls and not at_begin:
                 return self.closest(wall, part)
             require(
@@ -835,18 +873,20 @@ class Flight:
             return best
         # A guess: the fraction closest to a root, with a denominator of half as many digits. It
         # proves nothing. `is_zero` proves f = 0 there, and a root's enclosure holds one root only.
-        for time in (root.ends[0].limit_denominator(2 ** (self.bits // 2 - 8)) for _, root in hits):
+        for moment in (
+            root.ends[0].limit_denominator(2 ** (self.bits // 2 - 8)) for _, root in hits
+        ):
             met = {
                 w
                 for w, root in hits
-                if root.ends[0] <= time <= root.ends[1] and self.is_zero(w, time)
+                if root.ends[0] <= moment <= root.ends[1] and self.is_zero(w, moment)
             }
             is_first = (
-                all(wall in met or time < root.ends[0] for wall, root in hits)
-                and 0 < time < self.end
-                and (exact is None or time <= exact)
+                all(wall in met or moment < root.ends[0] for wall, root in hits)
+                and 0 < moment < self.end
+                and (exact is None or moment <= exact)
             )
-            met |= {"base"} if time == exact else set()
+            met |= {"base"} if moment == exact else set()
             is_edge = self.scene.table == "mushroom" and "base" in met and "arc" not in met
             require(
                 not (is_first and len(met) > 1),
@@ -1250,6 +1290,76 @@ def require_inside(name: str, claim: Any, found: Interval) -> None:
     )
 
 
+# The fields of a line, of an answer in it and of a step, with the types that JSON has for them. A line
+# that has a field more, at any depth, is not read: somebody may take it for a part of what is proved.
+NUMBER, TEXT = (int, float), (str,)
+FORMS: dict[str, dict[str, tuple[type, ...]]] = {
+    "line": {
+        **dict.fromkeys(("id", "group", "level", "kind", "rule", "source"), TEXT),
+        **dict.fromkeys(("scene", "state"), (dict,)),
+        "t_end": (),  # of any type: a horizon that is no number is bad input
+        "expect": (list,),
+        "collisions": (int,),
+        "condition": NUMBER,
+    },
+    "answer": {"outcome": TEXT, "steps": (list,), "reason": TEXT, "stays": (list,)},
+    "step": {
+        **dict.fromkeys((*NUMBERS, "allowance"), (list,)),
+        "wall": (str, type(None)),
+    },
+}
+
+
+def require_form(what: str, data: Any) -> None:
+    """Require that an object of a line has known fields only, each of its type.
+
+    Raises:
+        Unreadable: naming the field.
+    """
+    require(isinstance(data, dict), Unreadable(f"{what} must be an object"))
+    for name, value in data.items():
+        require(name in FORMS[what], Unreadable(f"{what} has an unknown field {name}"))
+        types = FORMS[what][name]
+        is_right = type(value) in types or not types
+        require(is_right, Unreadable(f"{what} has a field {name} of another type"))
+
+
+def require_known(record: Any) -> None:
+    """Require that a line has known fields only, at every depth.
+
+    The scene and the state are the question. An unknown field there is bad input, and the line may
+    say so.
+
+    Raises:
+        Unreadable: naming the field.
+    """
+    require_form("line", record)
+    for answer in take(record, "expect", list):
+        require_form("answer", answer)
+        for step in answer.get("steps", []):
+            require_form("step", step)
+            allowance = step.get("allowance", [0] * 5)
+            require(
+                len(allowance) == 5 and all(type(number) in NUMBER for number in allowance),
+                Unreadable("allowance must be five numbers"),
+            )
+
+
+def require_narrow(record: Any, digits: int) -> None:
+    """Require that each enclosure of the first answer is at most 10^-digits of its larger end wide.
+
+    Raises:
+        Unproved: one is wider.
+    """
+    for place, step in enumerate(record["expect"][0].get("steps", []), 1):
+        for name in NUMBERS:
+            low, high = map(Fraction, step[name])
+            require(
+                (high - low) * 10**digits <= max(abs(low), abs(high)),
+                Unproved(f"step {place}: the enclosure of {name} is not narrow to {digits} digits"),
+            )
+
+
 def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
     """Hold a line to what is proved at one precision.
 
@@ -1333,8 +1443,9 @@ def thin(path: Sequence[Step], claimed: Any) -> Iterator[Step]:
     """
     stays = list(find_stays([mark(step) for step in path]))
     kept = sorted({place for stay in stays for place in stay} | {len(path) - 1})
+    listed = {place: at for at, place in enumerate(kept)}
     # Of 1.0 and true, which equal 1 and are no places, the text is another.
-    places = [[kept.index(place) for place in stay] for stay in stays]
+    places = [[listed[place] for place in stay] for stay in stays]
     require(
         claimed == places and str(claimed) == str(places),
         Contradicted("the particle is captured at other times"),
@@ -1344,11 +1455,12 @@ def thin(path: Sequence[Step], claimed: Any) -> Iterator[Step]:
         yield path[place]._replace(numbers={**path[place].numbers, "dt": dt})
 
 
-def verify_line(record: Any) -> Verdict:
+def verify_line(record: Any, digits: int | None = None) -> Verdict:
     """Prove a line of a corpus.
 
     Args:
         record: the line's JSON.
+        digits: if given, an enclosure wider than 10^-digits of its larger end is "not proved".
 
     Returns:
         The verdict: "proved", "false" or "not proved", and which step of the argument fails.
@@ -1356,105 +1468,48 @@ def verify_line(record: Any) -> Verdict:
     Raises:
         Unreadable: it is no line of a corpus.
     """
+    require_known(record)
     read = lru_cache(partial(read_scene, take(record, "scene", dict), [WORK]))
     verdict = Verdict("not proved")
     for bits in PRECISIONS:
         try:
             check_line(record, read, bits)
-            return Verdict("proved")
+            break
         except Contradicted as reason:
             # It is proved, whatever the precision.
             return Verdict("false", str(reason))
         except Unproved as reason:
             verdict = Verdict("not proved", str(reason))
-    return verdict
+    else:
+        return verdict
+    try:
+        if digits is not None:
+            require_narrow(record, digits)
+    except Unproved as reason:
+        return Verdict("not proved", str(reason))
+    return Verdict("proved")
 
 
-# 9. Answers in floating point
+# The proof ends here. What follows reads files and prints verdicts (9), and estimates errors (10).
+
+# 9. Files
 
 
-def first_step(scene: Scene, state: State, t_end: Fraction) -> tuple[str | None, list[Fraction]]:
-    """Return the wall that is met first, and t, x, y, vx, vy after it."""
-    step = next(walk(scene._replace(work=[WORK]), state, t_end, 256))
-    dt, *rest = (sum(step.numbers[name].ends, Fraction(0)) / 2 for name in NUMBERS)
-    return step.wall, [state.t + dt, *rest]
+def printable(text: str) -> str:
+    """Return a text as one line of characters that can be printed; the others are escaped."""
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text
+    )
 
 
-def backward_error(scene: Scene, state: State, t_end: Fraction, answer: Any) -> float:
-    """Estimate how far an answer to one step is from the truth, in units of 2^-53.
-
-    The truth is the middle of an enclosure with 256 bits. Each error is divided by what moves that
-    number: the sum of its changes when one input at a time grows by 2^-53 of itself, and 2^-53 of
-    the number. x and y share the larger of theirs, or 2^-53 of the way flown if that is larger; vx
-    and vy share theirs. Where what moves a number is 0 only the truth is right. The result is the
-    worst of five ratios, at most LARGE.
-
-    Raises:
-        Refused: a field is missing, or no number.
-        Contradicted: another wall is met first.
-        Unproved: 256 bits cannot tell.
-    """
-    given = [read_number(name, answer.get(name)) for name in FIELDS]
-    wall, truth = first_step(scene, state, t_end)
-    require(answer.get("wall") == wall, Contradicted(f"{wall or 'the horizon'} is met first"))
-    moves = [UNIT * abs(value) for value in truth]
-    for name in FIELDS:
-        moved = state._replace(**{name: getattr(state, name) * (1 + UNIT)})
-        other, values = first_step(scene, moved, max(t_end, moved.t))
-        require(
-            other == wall, Unproved(f"{other} is met first when {name} moves by its last place")
-        )
-        moves = [move + abs(one - two) for move, one, two in zip(moves, values, truth, strict=True)]
-    way = UNIT * max(abs(state.vx), abs(state.vy)) * (truth[0] - state.t)
-    sizes = [moves[0], *[max(*moves[1:3], way)] * 2, *[max(moves[3:])] * 2]
-    ratios = [
-        abs(one - two) / size if size else LARGE * (one != two)
-        for one, two, size in zip(given, truth, sizes, strict=True)
-    ]
-    return float(min(max(ratios), LARGE))
-
-
-def verify_answers(text: str) -> Iterator[tuple[str, Verdict]]:
-    """Judge a trajectory of floating-point numbers: each step starts from the answer before it.
-
-    "Proved" means here: the wall is proved, and the estimated backward error is at most WRONG.
+def name_of(record: Any) -> str:
+    """Return the id of a line as it is printed: between quotes, unless it looks like an id.
 
     Raises:
-        Unreadable: the text is no object with `scene`, `state`, `steps`, and maybe `t_end`.
-        Refused: the scene is invalid.
-        Unproved: whether the scene is valid is open.
+        Unreadable: there is none.
     """
-    data = json.loads(text, object_pairs_hook=read_object)
-    scene = read_scene(take(data, "scene", dict), [WORK])
-    t_end = read_number("t_end", data.get("t_end", 1e300))
-    steps = [take({"a step": step}, "a step", dict) for step in take(data, "steps", list)]
-    for place, (before, answer) in enumerate(
-        itertools.pairwise([take(data, "state", dict), *steps]), 1
-    ):
-        try:
-            state = read_state(scene, {name: before.get(name) for name in (*FIELDS, "wall")})
-            error = backward_error(scene, state, t_end, answer)
-            verdict = Verdict(
-                "proved" if error * UNIT <= WRONG else "false",
-                f"{answer.get('wall') or 'the horizon'}, within {error:.2g} backward ulps",
-            )
-        except (Contradicted, Undefined, Refused, Unproved) as reason:
-            verdict = Verdict(
-                "false" if isinstance(reason, Contradicted) else "not proved", str(reason)
-            )
-        yield f"step {place}", verdict
-
-
-def verify_file(path: str) -> Iterator[tuple[str, Verdict]]:
-    """Verify each line of a corpus file.
-
-    Raises:
-        Unreadable: a line is none of a corpus.
-    """
-    with Path(path).open(encoding="utf-8", newline="\n") as lines:
-        for place, line in enumerate(lines, 1):
-            record = json.loads(line, object_pairs_hook=read_object)
-            yield f"{path}:{place}: {take(record, 'id', str)}", verify_line(record)
+    name = take(record, "id", str)
+    return name if re.fullmatch(r"[\w./-]+", name, re.ASCII) else f'"{printable(name)}"'
 
 
 def read_object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -1467,25 +1522,604 @@ def read_object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return dict(pairs)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Verify files; return 0 when all is proved, 1 when not, 2 when something is unreadable."""
-    has_answers, statuses, path = list(arguments[:1]) == ["--answers"], [], "verify.py"
+def read_json(text: bytes) -> Any:
+    """Return what a JSON text says.
+
+    Raises:
+        Unreadable: it is none.
+    """
     try:
-        require(len(arguments) > has_answers, Unreadable("give files, or --answers and files"))
-        for path in arguments[has_answers:]:
-            for where, verdict in (
-                verify_answers(Path(path).read_text(encoding="utf-8"))
-                if has_answers
-                else verify_file(path)
-            ):
-                statuses.append(verdict.status)
-                if has_answers or verdict.status != "proved":
-                    print(f"{where}: {verdict.status}: {verdict.reason}")
-    except (OSError, ValueError, RecursionError, Refused, Unproved) as error:
-        print(f"{path}: unreadable after {len(statuses)} claims: {error}", file=sys.stderr)
-        return 2
-    print(f"{statuses.count('proved')} of {len(statuses)} proved")
-    return int(statuses.count("proved") < len(statuses))
+        return json.loads(text.decode("utf-8"), object_pairs_hook=read_object)
+    except RecursionError:
+        raise Unreadable("nested too deeply") from None
+    except json.JSONDecodeError as error:
+        is_long = error.doc.count("\n", 0, error.pos) > 0
+        line = f"line {error.lineno}, " if is_long else ""
+        raise Unreadable(f"{error.msg}, {line}column {error.colno}") from None
+    except UnicodeDecodeError as error:
+        raise Unreadable(f"byte {error.start + 1} is no UTF-8") from None
+
+
+def read_lines(path: str) -> Iterator[tuple[str, bytes]]:
+    """Yield the lines of a file that are not blank, each with its place; "-" is standard input.
+
+    Raises:
+        Unreadable: the file cannot be read, or has no such line.
+    """
+    is_empty = True
+    try:
+        with open(0 if path == "-" else path, "rb", closefd=path != "-") as lines:
+            for number_of_line, line in enumerate(lines, 1):
+                if line.strip():
+                    is_empty = False
+                    yield f"{printable(path)}:{number_of_line}", line
+    except OSError as error:
+        raise Unreadable(f"{printable(path)}: {error.strerror}") from None
+    require(not is_empty, Unreadable(f"{printable(path)}: there is nothing to verify in this file"))
+
+
+def verify_file(path: str, digits: int | None = None) -> Iterator[tuple[str, Verdict]]:
+    """Verify each line of a corpus file.
+
+    Raises:
+        Unreadable: a line is none of a corpus.
+    """
+    for where, line in read_lines(path):
+        try:
+            record = read_json(line)
+            name, verdict = name_of(record), verify_line(record, digits)
+        except Unreadable as error:
+            raise Unreadable(f"{where}: {error}") from None
+        yield f"{where}: {name}", verdict
+
+
+class Options(argparse.ArgumentParser):
+    """The options of the command line. A fault in them is one line, as in a file."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise what is wrong.
+
+        Raises:
+            Unreadable: always.
+        """
+        raise Unreadable(f"{message} (--help lists the options)")
+
+
+def between(low: float, high: float, kind: type) -> Callable[[str], Any]:
+    """Return a function that reads a number of the command line within two bounds."""
+
+    def read(text: str) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = None
+        if value is None or not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text!r} must be from {low:g} to {high:g}")
+        return value
+
+    return read
+
+
+def read_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the command line.
+
+    Raises:
+        Unreadable: it is wrong.
+        SystemExit: it asks for help.
+    """
+    parser = Options(
+        prog="verify.py",
+        allow_abbrev=False,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description=(__doc__ or "").partition("\nA particle")[0],
+        epilog="Exit code: 0 all is proved (or agrees), 1 something is not, 2 bad input, "
+        "130 interrupted.",
+    )
+    add = parser.add_argument
+    add("files", nargs="+", metavar="FILE", help="JSON lines; - is standard input")
+    add(
+        "--digits", metavar="N", type=between(1, 1000, int),
+        help="demand enclosures at most 10^-N wide, relative to the larger end",
+    )  # fmt: skip
+    add("--answers", action="store_true", help="judge paths in floating point: JSON, JSONL or CSV")
+    add("--scene", metavar="FILE", help="the scene of a CSV file, as JSON")
+    add(
+        "--t-end", metavar="T", type=between(-LARGEST, LARGEST, float),
+        help="the horizon, where the file gives none",
+    )  # fmt: skip
+    add(
+        "--within", metavar="ULPS", type=between(0, LARGEST, float),
+        help=f"largest backward error that agrees, in units of 2^-53 (default: {WITHIN:.3g})",
+    )  # fmt: skip
+    add("--all", action="store_true", help="judge what follows a false step, too")
+    options = parser.parse_args(arguments)
+    given = {"--scene": options.scene, "--t-end": options.t_end, "--within": options.within}
+    given["--all"] = options.all or None
+    foreign = [name for name, value in given.items() if value is not None]
+    require(options.answers or not foreign, Unreadable(f"{foreign[:1]} goes with --answers"))
+    require(not (options.answers and options.digits), Unreadable("--digits is for proofs only"))
+    if options.within is None:
+        options.within = WITHIN
+    return options
+
+
+def run(options: argparse.Namespace, counts: dict[str, int]) -> int:
+    """Judge files, print what is not proved, and return the exit code.
+
+    Raises:
+        Unreadable: a file is none of what it should be.
+    """
+    if options.answers:
+        # All files are judged, also after one in which something is false.
+        return max([judge_file(path, options, counts) for path in options.files])
+    for path in options.files:
+        for where, verdict in verify_file(path, options.digits):
+            counts["claims"] += 1
+            counts["proved"] += verdict.status == "proved"
+            if verdict.status != "proved":
+                print(printable(f"{where}: {verdict.status}: {verdict.reason}"))
+    print(f"{counts['proved']} of {counts['claims']} proved")
+    return int(counts["proved"] < counts["claims"])
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the command line.
+
+    Returns:
+        0 when all is proved, or agrees; 1 when not; 2 when something is unreadable; 130 after an
+        interrupt, and 141 when nobody reads on, as shells count it.
+    """
+    counts = {"claims": 0, "proved": 0}
+    try:
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            sys.stdout.reconfigure(errors="backslashreplace")
+        code = run(read_options(arguments), counts)
+        sys.stdout.flush()
+        return code
+    except SystemExit:  # after --help
+        return 0
+    except Unreadable as error:
+        code, words = 2, f"{error} (after {counts['claims']} claims)"
+    except KeyboardInterrupt:
+        code, words = 130, f"interrupted after {counts['claims']} claims"
+    except OSError as error:
+        # What is still in the buffer would raise the same again when Python ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):
+            return 141
+        code, words = 2, f"cannot write the result: {error.strerror}"
+    print(printable(f"verify.py: {words}"), file=sys.stderr)
+    return code
+
+
+# 10. Answers in floating point (--answers): estimates, which prove nothing
+
+
+class Answers(NamedTuple):
+    """A path that was computed in floating point.
+
+    Attributes:
+        scene: its scene.
+        t_end: its horizon.
+        state: where it begins, as JSON.
+        steps: where it is said to lead, each with its place in the file. They are read one by one.
+    """
+
+    scene: Scene
+    t_end: Fraction
+    state: dict[str, Any]
+    steps: Iterator[tuple[str, Any]]
+
+
+class Truth(NamedTuple):
+    """A step as it really is, from a state in floating point; and the state after it.
+
+    Attributes:
+        flight: the flight from the state.
+        hit: the wall met and when; None at the horizon.
+        numbers: dt, x, y, vx, vy at its end.
+    """
+
+    flight: Flight
+    hit: tuple[str, Interval] | None
+    numbers: list[Fraction]
+
+
+def find_truth(scene: Scene, state: State, t_end: Fraction) -> Truth:
+    """Return the step that follows a state.
+
+    Raises:
+        Refused: the state is bad.
+        Undefined: the motion has no next step.
+        Unproved: 256 bits cannot tell.
+    """
+    question = Unproved("nothing was tried")
+    for bits in PRECISIONS[:2]:
+        try:
+            flight, in_cap = start(scene._replace(work=[WORK]), state, t_end, bits)
+            hit = flight.event(in_cap=in_cap)
+        except Unproved as failure:
+            question = failure
+        else:
+            return Truth(flight, hit, arrive(flight, hit))
+    raise question
+
+
+def arrive(flight: Flight, hit: tuple[str, Interval] | None) -> list[Fraction]:
+    """Return dt, x, y, vx, vy at the end of a flight: the lower ends of narrow enclosures."""
+    if hit is not None:
+        numbers, _ = bounce(flight, hit)
+        return [numbers[name].ends[0] for name in NUMBERS]
+    (x, y, vx, vy), end = flight.line, number(flight.end, flight.bits)
+    return [part.ends[0] for part in (end, x + vx * end, y + vy * end, vx, vy)]
+
+
+def move_input(truth: Truth, name: str) -> list[Fraction]:
+    """Return what the end of a step becomes when one number of its start grows by 2^-53 of itself.
+
+    The same wall is met. One step of Newton's method finds when: what it leaves is of second order.
+    """
+    flight, hit = truth.flight, truth.hit
+    assert flight.state is not None
+    value = getattr(flight.state, name)
+    state = flight.state._replace(**{name: value * (1 + UNIT)})
+    scene, bits, zero = flight.scene, flight.bits, flight.clock.zero
+    end = max(flight.end - (state.t - flight.state.t), Fraction(0))
+    clock = Clock(scene, state.t, bits) if name == "t" else flight.clock
+    x, y, vx, vy = (number(value, bits) for value in state[1:5])
+    moved = Flight(clock, (x, y, vx, vy), end, zero, flight.wall, state=state)
+    if name != "t":
+        moved._laws = flight._laws
+    if moved.wall is not None:
+        moved.residual = moved.f(moved.wall, zero).f
+    if hit is None:
+        return arrive(moved, None)
+    wall, root = hit
+    near = root.simplest()
+    jet = moved.f(wall, near)
+    return arrive(moved, (wall, (near - jet.f / jet.d1).low))
+
+
+def measure_sizes(truth: Truth, state: State) -> dict[str, Fraction]:
+    """Return the unit in which the error of each number is counted: one backward ulp.
+
+    It is 2^-53 of the number, plus the sum of its changes when one number of the start at a time
+    grows by 2^-53 of itself. x and y share the larger of theirs, or 2^-53 of the way flown if that
+    is larger; vx and vy share theirs.
+    """
+    sizes = [UNIT * abs(value) for value in truth.numbers]
+    for name in FIELDS:
+        if getattr(state, name):
+            moved = move_input(truth, name)
+            changes = (abs(a - b) for a, b in zip(moved, truth.numbers, strict=True))
+            sizes = [size + change for size, change in zip(sizes, changes, strict=True)]
+    dt = truth.numbers[0]
+    way = UNIT * max(abs(state.vx), abs(state.vy)) * dt
+    place, speed = max(*sizes[1:3], way), max(sizes[3:])
+    t = sizes[0] + UNIT * (abs(state.t) + abs(state.t + dt))
+    return {"t": t, "dt": sizes[0], "x": place, "y": place, "vx": speed, "vy": speed}
+
+
+def read_answer(answer: Any) -> dict[str, Fraction]:
+    """Return the numbers of a step: t, x, y, vx, vy, and dt where it is given.
+
+    Raises:
+        Contradicted: a field is missing, unknown, or no finite number; or the outcome is another.
+    """
+    require(isinstance(answer, dict), Contradicted("the step is no object"))
+    for name in answer:
+        is_known = name in (*FIELDS, "dt", "wall", "outcome")
+        require(is_known, Contradicted(f"{name} is an unknown field"))
+    is_end = answer.get("outcome") == "horizon"
+    for name in (*FIELDS, *([] if is_end else ["wall"])):
+        require(name in answer, Contradicted(f"{name} is missing"))
+    outcome = "horizon" if answer.get("wall") is None else "collision"
+    is_right = answer.get("outcome", outcome) == outcome
+    require(is_right, Contradicted("outcome and wall contradict each other"))
+    numbers = {}
+    for name in (*FIELDS, "dt"):
+        if name in answer:
+            try:
+                numbers[name] = read_number(name, answer[name])
+            except Refused:
+                value = repr(answer[name])[:40]
+                raise Contradicted(f"{name} = {value} is no finite number") from None
+    return numbers
+
+
+def measure_errors(scene: Scene, state: State, t_end: Fraction, answer: Any) -> dict[str, float]:
+    """Estimate the error of each number of a step, with its sign, in backward ulps.
+
+    dt is judged beside t: late in a path a large error of dt is a small one of t. An answer without
+    dt gives it as the difference of two times. The last is rounded, so that TICKS units of it are
+    no error of dt. A clock that does not go on is false however late it is.
+
+    Raises:
+        Contradicted: a field is wrong, another wall is met first, or the clock stands still.
+        Refused, Undefined, Unproved: the step is open.
+    """
+    given = read_answer(answer)
+    truth = find_truth(scene, state, t_end)
+    dt, x, y, vx, vy = truth.numbers
+    wall, right = answer.get("wall"), truth.hit[0] if truth.hit else None
+    if wall != right:
+        require_not_close(scene, state, t_end, wall)
+        raise Contradicted(f"{right or 'the horizon'} is met first, not {wall or 'the horizon'}")
+    t = state.t + dt
+    unit = 2 * UNIT * abs(t)
+    stands = given["t"] <= state.t and dt > unit
+    require(not stands, Contradicted("t does not grow, and the flight takes time"))
+    sizes = measure_sizes(truth, state)
+    right_numbers = {"t": t, "dt": dt, "x": x, "y": y, "vx": vx, "vy": vy}
+    wrong = {name: given[name] - right_numbers[name] for name in given}
+    if "dt" not in given:
+        late = wrong["t"]
+        wrong["dt"] = max(abs(late) - TICKS * unit, Fraction(0)) * (1 if late > 0 else -1)
+    return {name: ratio(wrong[name], size) for name, size in sizes.items()}
+
+
+def ratio(error: Fraction, size: Fraction) -> float:
+    """Return an error in units, at most LARGE. Where nothing moves a number only 0 is no error."""
+    if size == 0:
+        return float(LARGE) * ((error > 0) - (error < 0))
+    return float(max(-LARGE, min(error / size, LARGE)))
+
+
+def require_not_close(scene: Scene, state: State, t_end: Fraction, wall: Any) -> None:
+    """Require that a wall is not met first when one number of the start moves by its last place.
+
+    Raises:
+        Unproved: it is; then both walls are right in floating point.
+    """
+    for name, sign in itertools.product(FIELDS, (1, -1)):
+        moved = state._replace(**{name: getattr(state, name) * (1 + sign * UNIT)})
+        try:
+            hit = find_truth(scene, moved, max(t_end, moved.t)).hit
+        except (Refused, Undefined, Unproved):
+            continue
+        is_close = (hit[0] if hit else None) == wall
+        require(not is_close, Unproved(f"which wall is first hangs on the last place of {name}"))
+
+
+class Tally:
+    """The errors of one number over a path: the worst, the mean, and the mean with signs.
+
+    A step that is wrong by as much in the same direction each time is a bias. It adds up over a
+    path, while errors of both signs cancel. `outward` takes an error as positive where the number
+    is too large in size: a factor of all velocities shows there, and a constant shows in `signed`.
+    """
+
+    def __init__(self) -> None:
+        """Begin with no step."""
+        self.n, self.total, self.worst, self.place = 0, 0.0, 0.0, "-"
+        self.sums = {"signed": (0.0, 0.0), "outward": (0.0, 0.0)}
+
+    def add(self, place: str, error: float, given: float) -> None:
+        """Count the error of a step, whose answer is given."""
+        self.n += 1
+        self.total += abs(error)
+        if abs(error) > self.worst:
+            self.worst, self.place = abs(error), place
+        for kind, value in (("signed", error), ("outward", error if given >= 0 else -error)):
+            total, squares = self.sums[kind]
+            self.sums[kind] = total + value, squares + value * value
+
+    def mean(self, kind: str) -> float:
+        """Return the mean error with its sign."""
+        return self.sums[kind][0] / max(self.n, 1)
+
+    def is_biased(self, kind: str) -> bool:
+        """Tell whether a mean is over one ulp and over FIVE standard errors, from 8 steps on."""
+        mean, squares = self.mean(kind), self.sums[kind][1]
+        spread = max(squares / max(self.n, 1) - mean * mean, 0.0) / max(self.n - 1, 1)
+        return self.n >= 8 and abs(mean) > 1 and mean * mean > 25 * spread
+
+
+class Report:
+    """What is known of a path after some of its steps.
+
+    Attributes:
+        counts: how many steps agree, are false, or are open.
+        tallies: the errors of each number, over the steps that are not open.
+        first_false: the place of the first false step, from 0; None if there is none.
+    """
+
+    def __init__(self, within: float) -> None:
+        """Begin with no step; an error up to `within` backward ulps agrees."""
+        self.within, self.counts = within, {"agrees": 0, "false": 0, "open": 0}
+        self.tallies = {name: Tally() for name in ("t", "dt", "x", "y", "vx", "vy")}
+        self.first_false: int | None = None
+
+    @property
+    def n_steps(self) -> int:
+        """Return how many steps were judged."""
+        return sum(self.counts.values())
+
+    def judge(self, answers: Answers, before: Any, place: str, answer: Any) -> Verdict:
+        """Judge one step from the answer before it, and count it."""
+        verdict = self._judge(answers, before, place, answer)
+        if verdict.status == "false" and self.first_false is None:
+            self.first_false = self.n_steps
+        self.counts[verdict.status] += 1
+        return verdict
+
+    def _judge(self, answers: Answers, before: Any, place: str, answer: Any) -> Verdict:
+        is_state = isinstance(before, dict) and {*FIELDS} <= set(before)
+        try:
+            require(is_state, Unproved("the step before cannot be read"))
+            fields = {name: before.get(name) for name in (*FIELDS, "wall")}
+            state = read_state(answers.scene, fields)
+            errors = measure_errors(answers.scene, state, answers.t_end, answer)
+        except Contradicted as reason:
+            return Verdict("false", str(reason))
+        except Undefined as reason:
+            return Verdict("open", f"the motion has no next step ({reason})")
+        except (Refused, Unproved) as reason:
+            return Verdict("open", str(reason))
+        for name, error in errors.items():
+            self.tallies[name].add(place, error, float(answer.get(name, 1.0)))
+        worst = max(errors, key=lambda name: abs(errors[name]))
+        wall = answer.get("wall") or "the horizon"
+        words = f"{wall}, {worst} within {abs(errors[worst]):.2g} backward ulps"
+        return Verdict("agrees" if abs(errors[worst]) <= self.within else "false", words)
+
+    def lines(self) -> Iterator[str]:
+        """Yield the summary: a table of errors, each bias, and how many steps agree."""
+        yield "in backward ulps  worst     mean      mean signed  mean outward  worst at"
+        for name, tally in self.tallies.items():
+            numbers = f"{tally.worst:<10.3g}{tally.total / max(tally.n, 1):<10.3g}"
+            means = f"{tally.mean('signed'):<13.3g}{tally.mean('outward'):<14.3g}"
+            yield f"{name:<18}{numbers}{means}{tally.place}"
+        for name, tally in self.tallies.items():
+            for kind in ("signed", "outward"):
+                if tally.is_biased(kind):
+                    size = f"{tally.mean(kind):+.3g} backward ulps a step ({kind} mean)"
+                    yield f"bias: {name} is wrong by {size} over {tally.n} steps"
+        within = f"agree within {self.within:.3g} backward ulps"
+        others = "".join(f", {self.counts[name]} {name}" for name in ("false", "open"))
+        yield f"{self.counts['agrees']} of {self.n_steps} {within}{others}"
+
+
+def judge_path(
+    answers: Answers, report: Report, *, is_all: bool = False
+) -> Iterator[tuple[str, Verdict]]:
+    """Judge each step from the answer before it, up to the first false one or, if asked, all."""
+    before: Any = answers.state
+    for place, answer in answers.steps:
+        verdict = report.judge(answers, before, place, answer)
+        yield place, verdict
+        if verdict.status == "false" and not is_all:
+            return
+        before = answer
+
+
+def judge_file(path: str, options: argparse.Namespace, counts: dict[str, int]) -> int:
+    """Judge a path, print what does not agree and a summary, and return the exit code.
+
+    Raises:
+        Unreadable: the file is no path.
+    """
+    answers = read_answers(path, options.scene, options.t_end)
+    report, begin = Report(options.within), time.monotonic()
+    told = begin
+    for place, verdict in judge_path(answers, report, is_all=options.all):
+        counts["claims"] += 1
+        if verdict.status != "agrees":
+            print(printable(f"{path}: {place}: {verdict.status}: {verdict.reason}"))
+        if time.monotonic() > told + PULSE:
+            told = time.monotonic()
+            words = f"{report.n_steps} steps judged in {told - begin:.0f} s"
+            print(printable(f"{path}: {words}"), file=sys.stderr, flush=True)
+    require(report.n_steps, Unreadable(f"{printable(path)}: there is no step to judge"))
+    for line in report.lines():
+        print(printable(line))
+    if report.counts["false"] and not options.all:
+        print("stopped at the first false step; --all judges the others, too")
+    return int(report.counts["agrees"] < report.n_steps)
+
+
+def read_answers(path: str, scene_path: str | None = None, t_end: float | None = None) -> Answers:
+    """Read a path in floating point.
+
+    JSON: an object with `scene`, `state`, `steps`, and maybe `t_end`. JSON lines: the first has all
+    but `steps`, each further one is a step. CSV: each row is a state, the first row is the start,
+    and the scene is another file.
+
+    Raises:
+        Unreadable: it is none of these, or its scene or its start is refused.
+    """
+    lines = read_lines(path)
+    is_table = path.endswith(".csv")
+    require(is_table == (scene_path is not None), Unreadable("--scene goes with each CSV file"))
+    if is_table:
+        scene = read_whole(read_lines(str(scene_path)))
+        rows = read_rows(lines)
+        _, first = next(rows, ("", {}))
+        return build_answers({"scene": scene, "state": first}, t_end, rows)
+    where, text = next(lines)
+    try:
+        head = read_json(text)
+    except Unreadable:
+        head = {"steps": []}  # the first line is not all of it
+    if not isinstance(head, dict) or "steps" in head:
+        head = read_whole(itertools.chain([(where, text)], lines))
+        places = enumerate(take(head, "steps", list), 1)
+        return build_answers(head, t_end, ((f"step {k}", step) for k, step in places))
+    return build_answers(head, t_end, read_steps(lines))
+
+
+def read_whole(lines: Iterable[tuple[str, bytes]]) -> Any:
+    """Return what a file says that is one JSON text."""
+    parts = [text for _, text in lines]
+    return read_json(b"".join(parts))
+
+
+def read_steps(lines: Iterable[tuple[str, bytes]]) -> Iterator[tuple[str, Any]]:
+    """Yield a step for each line of JSON, with its place."""
+    for k, (where, text) in enumerate(lines, 1):
+        try:
+            yield f"step {k}", read_json(text)
+        except Unreadable as error:
+            raise Unreadable(f"{where}: {error}") from None
+
+
+def read_rows(lines: Iterable[tuple[str, bytes]]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the rows of a CSV file, the start as step 0. An empty wall is the horizon.
+
+    Raises:
+        Unreadable: a row is no row, or the first does not name the columns.
+    """
+    names: list[str] = []
+    for where, line in lines:
+        try:
+            text = line.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise Unreadable(f"{where}: this is no UTF-8") from None
+        if text.startswith("#"):
+            continue
+        cells = [cell.strip() for cell in next(csv.reader([text]))]
+        if not names:
+            names, place = cells, 0
+            missing = [name for name in (*FIELDS, "wall") if name not in names]
+            unknown = [name for name in names if name not in (*FIELDS, "wall", "dt")]
+            require(not missing, Unreadable(f"{where}: column {missing[:1]} is missing"))
+            require(not unknown, Unreadable(f"{where}: column {unknown[:1]} is unknown"))
+            continue
+        is_row = len(cells) == len(names)
+        require(is_row, Unreadable(f"{where}: {len(cells)} cells, must be {len(names)}"))
+        row = {name: read_cell(name, cell) for name, cell in zip(names, cells, strict=True)}
+        yield f"step {place}", row
+        place += 1
+
+
+def read_cell(name: str, cell: str) -> Any:
+    """Return a number or a wall; what is no number stays a text, and is no finite number then."""
+    if name == "wall":
+        return cell or None
+    try:
+        return float.fromhex(cell) if "x" in cell.lower() else float(cell)
+    except (ValueError, OverflowError):
+        return cell
+
+
+def build_answers(
+    head: dict[str, Any], t_end: float | None, steps: Iterator[tuple[str, Any]]
+) -> Answers:
+    """Return a path whose scene is proved to be valid, and whose start has all fields.
+
+    Raises:
+        Unreadable: it has not.
+    """
+    unknown = [name for name in head if name not in ("scene", "state", "t_end", "steps")]
+    require(not unknown, Unreadable(f"{unknown[:1]} is an unknown field of a path"))
+    try:
+        scene = read_scene(take(head, "scene", dict), [WORK])
+        end = read_number("t_end", head.get("t_end", FAR if t_end is None else t_end))
+        state = take(head, "state", dict)
+        read_state(scene, {name: state[name] for name in state if name != "dt"})
+    except (Refused, Unproved) as failure:
+        raise Unreadable(str(failure)) from None
+    return Answers(scene, end, state, steps)
 
 
 if __name__ == "__main__":

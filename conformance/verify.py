@@ -1538,6 +1538,8 @@ def read_json(text: bytes) -> Any:
         raise Unreadable(f"{error.msg}, {line}column {error.colno}") from None
     except UnicodeDecodeError as error:
         raise Unreadable(f"byte {error.start + 1} is no UTF-8") from None
+    except ValueError as error:  # an integer of thousands of digits
+        raise Unreadable(str(error)) from None
 
 
 def read_lines(path: str) -> Iterator[tuple[str, bytes]]:
@@ -1679,7 +1681,8 @@ def main(arguments: Sequence[str]) -> int:
     except SystemExit:  # after --help
         return 0
     except Unreadable as error:
-        code, words = 2, f"{error} (after {counts['claims']} claims)"
+        n = counts["claims"]
+        code, words = 2, f"unreadable after {n} claims: {error}" if n else str(error)
     except KeyboardInterrupt:
         code, words = 130, f"interrupted after {counts['claims']} claims"
     except OSError as error:

@@ -1614,8 +1614,7 @@ def read_options(arguments: Sequence[str]) -> argparse.Namespace:
         allow_abbrev=False,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         description=(__doc__ or "").partition("\nA particle")[0],
-        epilog="Exit code: 0 all is proved (or agrees), 1 something is not, 2 bad input, "
-        "130 interrupted.",
+        epilog="Exit code: 0 all is proved (or agrees), 1 something is not, 2 bad input, 130 interrupted.",
     )
     add = parser.add_argument
     add("files", nargs="+", metavar="FILE", help="JSON lines; - is standard input")
@@ -1875,7 +1874,7 @@ def require_not_close(scene: Scene, state: State, t_end: Fraction, wall: Any) ->
         Unproved: it is; then both walls are right in floating point.
     """
     for name, sign in itertools.product(FIELDS, (1, -1)):
-        moved = state._replace(**{name: getattr(state, name) * (1 + sign * UNIT)})
+        moved = state._replace(**{name: getattr(state, name) * (1 + sign * 2 * UNIT)})
         try:
             hit = find_truth(scene, moved, max(t_end, moved.t)).hit
         except (Refused, Undefined, Unproved):

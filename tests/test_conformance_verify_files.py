@@ -18,7 +18,8 @@ from conformance import verify
 
 CAP: dict[str, Any] = {"table": "cap", "r": 1.0}
 DOWN = {"t": 0, "x": 0, "y": 0.5, "vx": 0, "vy": -1.0}
-STEP = {"wall": "base", "dt": ["0.5", "0.5"], "x": ["0", "0"], "y": ["0", "0"], "vx": ["0", "0"], "vy": ["1", "1"]}
+NULL = ["0", "0"]
+STEP = {"wall": "base", "dt": ["0.5", "0.5"], "x": NULL, "y": NULL, "vx": NULL, "vy": ["1", "1"]}
 LINE: dict[str, Any] = {
     "id": "a/1", "kind": "step", "scene": CAP, "state": DOWN, "t_end": 9.0,
     "expect": [{"outcome": "collision", "steps": [STEP]}],

@@ -1702,12 +1702,14 @@ class Answers(NamedTuple):
 
     Attributes:
         scene: its scene.
+        wire_scene: the same as JSON.
         t_end: its horizon.
         state: where it begins, as JSON.
         steps: where it is said to lead, each with its place in the file. They are read one by one.
     """
 
     scene: Scene
+    wire_scene: dict[str, Any]
     t_end: Fraction
     state: dict[str, Any]
     steps: Iterator[tuple[str, Any]]
@@ -2121,7 +2123,7 @@ def build_answers(
         read_state(scene, {name: state[name] for name in state if name != "dt"})
     except (Refused, Unproved) as failure:
         raise Unreadable(str(failure)) from None
-    return Answers(scene, end, state, steps)
+    return Answers(scene, head["scene"], end, state, steps)
 
 
 if __name__ == "__main__":

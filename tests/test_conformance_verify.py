@@ -27,7 +27,7 @@ from scene.precision import decimals
 from scene.tables import laws
 
 N_CASES = int(os.environ.get("MUSHROOMS_INTERVALS", 1_500))
-N_FORGERIES = int(os.environ.get("MUSHROOMS_FORGERIES", 64))
+N_FORGERIES = int(os.environ.get("MUSHROOMS_FORGERIES", 66))
 BITS = (24, 53, 128, 256, 512)
 DECIMALS = 250
 
@@ -154,6 +154,48 @@ def test_a_line_has_one_budget_of_work(monkeypatch):
     monkeypatch.setattr(verify, "WORK", 2**10)
     line = next(line for line in pool("answered") if line["id"] == "longest-flow/1")
     assert verify.verify_line(line) == verify.Verdict("not proved", "the search takes too long")
+
+
+def vertical_flow(n: int) -> dict[str, Any]:
+    """Return the true flow of n steps of a particle on the axis of a mushroom at rest: x = vx = 0."""
+    t_end = 2.0 * n - 2.25
+    is_up = n % 2 == 0
+    y, vy = ("-0.75", "1") if is_up else ("0.75", "-1")
+    null = ["0", "0"]
+    step = {"dt": [str(t_end)] * 2, "x": null, "y": [y] * 2, "vx": null, "vy": [vy] * 2}
+    return {
+        "id": "a/1", "kind": "flow", "scene": {"table": "mushroom", "r": 1.0, "w": 0.5, "h": 1.0},
+        "state": {"t": 0, "x": 0, "y": 0.5, "vx": 0, "vy": -1.0}, "t_end": t_end, "collisions": n,
+        "expect": [{"outcome": "horizon", "steps": [step]}],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("n", [201, pytest.param(16_001, marks=pytest.mark.deep)])
+def test_a_long_flow_along_the_axis_is_proved(n):
+    assert verify.verify_line(vertical_flow(n)) == verify.Verdict("proved")
+
+
+def test_zero_keeps_its_exponent():
+    """It fell by 127 a bounce, and sums shifted ever longer integers: 16,001 steps took a minute."""
+    line = vertical_flow(201)
+    scene = verify.read_scene(line["scene"], [verify.WORK])
+    path = verify.walk(scene, verify.read_state(scene, line["state"]), Fraction(line["t_end"]), 128)
+    for step in path:
+        assert max(abs(number.exp) for number in step.numbers.values()) < 1_000
+    for a, b in itertools.product((verify.Interval(0, 0, -5_000, 64), verify.number(3, 64)), repeat=2):
+        if 0 in (a.lo, b.lo):
+            assert (a * b).exp == 0
+
+
+def test_work_grows_with_precision():
+    """With 4,096 bits a part takes some ten times as long as with 128."""
+    line = vertical_flow(5)
+    spent = []
+    for bits in (128, 4096):
+        work = [verify.WORK]
+        verify.check_line(line, lambda work=work: verify.read_scene(line["scene"], work), bits)
+        spent.append(verify.WORK - work[0])
+    assert 8 * spent[0] < spent[1] < 32 * spent[0]
 
 
 CAP: dict[str, Any] = {"table": "cap", "r": 1.0}

@@ -64,7 +64,7 @@ ENSEMBLES = {
 }
 TRAJECTORIES = {
     "t,x,y,vx 0,0,0,1": "column 'vy' is missing",
-    "t,x,y,vx,vy 0,0,0,1,up": "steps.csv':2: vy = 'up', must be a finite number",
+    "t,x,y,vx,vy,wall 0,0,0,1,up,": "steps.csv':2: vy = 'up', must be a finite number",
 }
 
 STEPPER = shlex.join([sys.executable, str(Path(conformance.__file__).parent / "harness/python/stepper.py")])
@@ -176,7 +176,7 @@ REFUSED: list[Any] = [
     ("ask fresh/999 --seed 1", ["ID = 'fresh/999'"]),
     ("ask moving-cap/3 -- ./no-such-stepper", ["no-such-stepper"]),
     (f"ask moving-cap/3 -- {shlex.join(command('other-protocol'))}", ["does not speak protocol 1"]),
-    ("verify none.json", ["'none.json': No such file"]),
+    ("verify none.json", ["none.json: No such file"]),
     # files that cannot be, or of no such kind
     ("draw moving-cap --out picture.jpeg", ["picture.jpeg", ".svg"]),
     ("draw moving-cap --out nowhere/picture.svg", ["nowhere/picture.svg", "No such"]),

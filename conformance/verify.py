@@ -17,16 +17,24 @@ computes with integers and imports Python's standard library only. docs/proof.md
  6. `start`: which wall a state leaves, or why it is refused or has no answer.
  7. `read_scene`: the scene is valid at all times, or is proved to be invalid.
  8. `check_line`: what a line claims, compared with what is proved.
- 9. `backward_error`: for --answers only, an estimate and not a proof.
 
-"Proved": the true numbers lie between the decimals, which may be far apart. "False": what is proved
-contradicts the claim. "Not proved": it is open at each precision up to 4,096 bits, or a search took
-too long. Walls that are met together at an irrational time stay open, and so do exact zeros of
-Fourier laws at another phase than 0.
+The proof ends there. Section 9 reads files and prints verdicts. Section 10 is for --answers only:
+it estimates errors and proves nothing.
 
-Not judged are the fields `allowance`, `condition` and `level`, the texts that describe a line, and
-the reason of a rejection. A scene counts as refused where `scene.from_data` refuses it, but where
-laws of both kinds meet in one condition: that one refuses what touches, or nearly.
+There are three verdicts:
+
+- "proved": the claim is true. The true numbers lie between the decimals, which may be far apart;
+  `--digits` bounds how far.
+- "false": something that is proved contradicts the claim.
+- "not proved": the claim is open at each precision up to 4,096 bits, or a search took too long.
+
+Two kinds of claims stay open: two walls met together at an irrational time, and exact zeros of a
+Fourier law at a phase that is not a whole number of quarter turns.
+
+The verifier does not judge the fields `allowance`, `condition` and `level`, the texts that describe
+a line, and the reason of a rejection. It refuses the scenes that `scene.from_data` refuses, with one
+exception: if laws of both kinds meet in one condition, `scene.from_data` also refuses scenes that
+touch or nearly touch the bound.
 """
 
 import argparse
@@ -70,7 +78,7 @@ HIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uff
 
 
 class Unproved(Exception):  # noqa: N818
-    """This precision leaves something open; the next one may not."""
+    """Something is open at this precision. The next precision may decide it."""
 
 
 class Refused(Exception):  # noqa: N818
@@ -487,7 +495,7 @@ def quarter(scene: Scene, time: Fraction) -> tuple[int, int]:
     """Return cosine and sine of the phase at a time, where it is a whole number of quarter turns.
 
     Raises:
-        Unproved: it is not.
+        Unproved: the phase is not a whole number of quarter turns.
     """
     quarters = 4 * time / scene.period if scene.period else Fraction(0)
     require(
@@ -549,9 +557,12 @@ class Flight:
     """A particle in flight: where walls are on its way, and what it meets first.
 
     Times count from the clock's instant. The line at time 0 is enclosed by a box. The flight begins
-    at some time in `begin`, which is exactly 0 for a state that is given. What is proved holds for
-    each state in the box. On the wall that it leaves f is not 0 at the begin but c, the residual,
-    because the state is rounded. There f - c stands for f.
+    at some time in `begin`, which is exactly 0 for a state that is given. The true state is one of
+    those in the box, and what is proved about walls that are met holds for every state in the box.
+
+    The wall being left is an exception. There f is not 0 at the begin but c, the residual, because
+    the state is rounded. f - c stands for f, and f - c = 0 at the begin holds for the true state
+    only. What is proved about this wall holds for the true state.
     """
 
     def __init__(
@@ -603,7 +614,7 @@ class Flight:
         Derivatives of laws with a period are those for 2 pi / period = `rate`.
 
         Raises:
-            Unproved: it is not known to be rational.
+            Unproved: f is not known to be rational at this time.
         """
         if self.state is None:
             raise Unproved("the state is not known exactly")
@@ -635,10 +646,18 @@ class Flight:
         - never reached: the wall never comes to where the particle is at either end
           (`is_never_met`).
 
-        The wall being left has f = 0 where the flight begins, somewhere in `begin`. A stretch that
-        holds `begin` holds all of it, and f > 0 is proved after the begin only. Rising and concave
-        prove this: the chord starts at 0, wherever the begin is. So does f'' > 0 if f' = 0 at the
-        begin exactly (lifting, `is_flat`).
+        The wall being left has f = 0 where the flight begins, somewhere in `begin`. On a stretch
+        that `begin` overlaps, f > 0 is proved after the begin only. There are three cases. If the
+        flight begins within the stretch, f rises from 0, or its chord starts at 0. If it begins
+        before the stretch, f > 0 is known at the left end. If it begins after the stretch, there is
+        nothing to prove. So "rising" and "concave" suffice there. f'' > 0 suffices, too, if f' = 0
+        at the begin exactly (lifting, `is_flat`).
+
+        Args:
+            wall: the wall.
+            s: the stretch.
+            jet: f and its derivatives over the stretch.
+            last: f at the right end.
         """
         is_positive_at_end = last.sign > 0
         if jet.d1.sign > 0 or (jet.d2.hi <= 0 and is_positive_at_end):
@@ -748,8 +767,8 @@ class Flight:
             in_cap: the flight begins above y = 0, or on it and moves up.
 
         Raises:
-            Undefined: two walls are met together, or the mouth's edge, exactly.
-            Unproved: this precision cannot tell.
+            Undefined: two walls are met together exactly, or the mouth's edge is met.
+            Unproved: this precision cannot tell what is met.
         """
         table, end, state = self.scene.table, number(self.end, self.bits), self.state
         if state and state.y == state.vy == 0 and table == "mushroom" and self.wall is None:
@@ -798,15 +817,22 @@ class Flight:
     ) -> tuple[str, Interval] | None:
         """Find which of some walls is met first, before y = 0 is crossed or the horizon comes.
 
-        Each search covers one stretch, for all walls. A wall without a root is clear at least to
-        the upper end of the earliest root: until a root is found walls are clear to the end of the
-        stretch, and the first root lies in it; then they are searched to just past the root found
-        last. So `earliest` needs to compare the roots only. A wall of which something is open is
-        asked again after the others: it may be open after their hit only.
+        Each search covers one stretch. All walls are searched in it, one after the other.
 
-        The last search goes a little past the limit, so that a root there lies inside. The limit is
-        the horizon if it ends at self.end; a crossing lies before that. What is met at the horizon
-        exactly is not met before it: its enclosure overlaps the horizon and holds one root only.
+        `stop` is where the search for the next wall ends. At first it is the end of the stretch.
+        Once a root is found it is just past that root. A later root may lie a little beyond the one
+        before, so `stop` may also grow. It never falls below the upper end of the earliest root.
+        Therefore a wall without a root is clear up to that upper end, and `earliest` needs to
+        compare the roots only.
+
+        A wall of which something is open is asked again after the others. Perhaps it is open after
+        their hit only, and then the search ends before that.
+
+        The last search goes a little past the limit, so that a root at the limit lies inside the
+        stretch. There are two kinds of limit. The horizon is enclosed by self.end exactly. A
+        crossing of y = 0 lies before that, so its upper end differs from self.end; a wall that is
+        met there counts as a hit, and `earliest` decides. A wall that is met at the horizon exactly
+        is not met before it: its enclosure overlaps the horizon and holds one root only.
         """
         for since, stop in self.stretches(start, limit.high):
             hits, queue = [], list(walls)
@@ -836,6 +862,9 @@ class Flight:
         The first is about as long as a crossing of the table or a period, whichever is less. Each
         next one is four times as long. The lengths affect the cost only, not what is proved. They
         are others at each precision: where a wall is met at the end of a stretch, it is open.
+
+        A particle at rest gives no length, nor does a table at rest. If both rest, one stretch
+        reaches `last`, and f is constant on it.
         """
         sizes = [law.ends[1] for name, law in self.scene.laws.items() if name in ("r", "w", "h")]
         speed = max(abs(end) for v in self.line[2:] for end in v.ends)
@@ -860,11 +889,13 @@ class Flight:
     ) -> tuple[str, Interval]:
         """Return the earliest of some hits, each the first of its wall.
 
-        `first_hit` has shown that walls without a hit come later.
+        `first_hit` has shown that walls without a hit are clear up to the upper end of the earliest
+        root. A moment that is guessed below lies within the enclosure of a root, and before all
+        roots that are not met at that moment. So walls without a hit are clear up to it, too.
 
         Raises:
             Undefined: walls are met together at a rational time, exactly, and all others later.
-            Unproved: which is first is open.
+            Unproved: it is open which wall is met first.
         """
         best = min(hits, key=lambda hit: hit[1].ends[1])
         if all(hit is best or is_below(best[1], hit[1]) for hit in hits) and is_below(
@@ -939,13 +970,17 @@ def start(scene: Scene, state: State, t_end: Fraction, bits: int) -> tuple[Fligh
     mouth it is on the base, so the arc is asked. Inside the mouth |x| < w <= r, so the arc is not
     asked. On the arc at y = 0 it is at a corner, so the base is asked, too.
 
+    Where w = r, a state at y = 0 and |x| = w is on a side, on the base and on the arc. If it names
+    the arc or the base, both of these are asked, and it is at a corner. If it names a side or no
+    wall, the sides are asked, and it is at the mouth's edge.
+
     Returns:
         The flight, and whether it begins in the cap.
 
     Raises:
-        Refused: the state is not in the table, or off its wall, or moves into it.
-        Undefined: it is on two walls, or slides along one.
-        Unproved: this precision cannot tell.
+        Refused: the state is outside the table, is off its wall, or moves into its wall.
+        Undefined: the state is on two walls, or slides along a wall.
+        Unproved: this precision cannot tell where the state is.
     """
     table, wall, level = scene.table, state.wall, state.y == 0
     require(state.t <= t_end, Refused("t_end is before state.t"))
@@ -992,9 +1027,9 @@ def is_flat(flight: Flight, wall: str) -> bool:
     coefficients do, and then at three rates.
 
     Raises:
-        Refused: f' < 0.
-        Undefined: f' = 0 and f'' <= 0.
-        Unproved: this precision cannot tell.
+        Refused: f' < 0, so the particle moves into the wall.
+        Undefined: f' = 0 and f'' <= 0, so the particle does not leave the wall.
+        Unproved: this precision cannot tell the sign of f' or f''.
     """
     slope, scene = flight.f(wall, flight.clock.zero).d1.sign, flight.scene
     require(slope >= 0, Refused(f"the particle starts on wall {wall} and moves into it"))
@@ -1016,8 +1051,8 @@ def require_near(flight: Flight, wall: str, gap: Interval) -> None:
     w, or |x| if greater. The arc's f is about 2 r times the distance, so it is divided by 2 r.
 
     Raises:
-        Refused: it is.
-        Unproved: this precision cannot tell.
+        Refused: the state is too far from its wall.
+        Unproved: this precision cannot tell how far the state is.
     """
     is_width = wall in ("left", "right") or (wall == "base" and flight.scene.table == "stem")
     size = flight.f("w" if is_width else "h" if wall == "floor" else "r", flight.clock.zero).f
@@ -1042,8 +1077,8 @@ def read_scene(data: Any, work: list[int]) -> Scene:
         work: one number: the units of work that are left.
 
     Raises:
-        Refused: it is not, with the condition that is broken.
-        Unproved: a condition is open.
+        Refused: the scene is invalid; the message names the broken condition.
+        Unproved: it is open whether a condition holds.
     """
     wanted = {
         "cap": [{"r"}],
@@ -1080,7 +1115,7 @@ def read_law(data: Any) -> tuple[Law, tuple[Fraction | None, Fraction | None]]:
     """Read a law, and its omega or its period.
 
     Raises:
-        Refused: it is none.
+        Refused: the JSON is not a law.
     """
     if not isinstance(data, dict):
         data = {"kind": "fourier", "mean": data, "omega": 1}
@@ -1113,7 +1148,7 @@ def read_legs(knots: Any) -> tuple[Law, tuple[None, Fraction]]:
     The law is at rest at the knots. Both legs have the same value and slope where they meet.
 
     Raises:
-        Refused: times do not rise, the law does not close, or its period is no binary64 number.
+        Refused: the times do not rise, the law does not close, or no binary64 number is the period.
     """
     require(
         isinstance(knots, list)
@@ -1138,7 +1173,7 @@ def read_number(name: str, value: Any) -> Fraction:
     """Return the binary64 number nearest to a number, as a fraction.
 
     Raises:
-        Refused: it is no finite number.
+        Refused: the value is not a finite number.
     """
     try:
         return Fraction(float(value if type(value) in (int, float, Fraction) else inf))
@@ -1152,11 +1187,14 @@ def require_valid(scene: Scene) -> None:
     A bound of a law shows it, or a search of section 4 over one period for a root of f. A root
     proves the condition broken: `first_root` accepts one only where f < 0 follows. So does a law
     that attains a bound <= 0 (`is_tight`). As r > 0, w = nu r <= r means nu <= 1. A condition that
-    touches 0 may stay open. The search has 256 bits at every precision.
+    touches 0 may stay open.
+
+    The search has 256 bits at every precision. More bits would seldom decide more, because the
+    numbers of a scene have 53. What is proved does not depend on that, only what stays open.
 
     Raises:
         Refused: a condition is broken.
-        Unproved: it is open.
+        Unproved: it is open whether a condition holds.
     """
     laws, clock = scene.laws, Clock(scene, Fraction(0), 256)
     zero, bounds = clock.zero, {name: law.ends[0] for name, law in laws.items() if name != "slope"}
@@ -1261,7 +1299,7 @@ def take(data: Any, name: str, kind: type) -> Any:
     """Return a field of a JSON object.
 
     Raises:
-        Unreadable: it is missing, or of another type.
+        Unreadable: the field is missing, or has another type.
     """
     require(
         isinstance(data, dict) and isinstance(data.get(name), kind),
@@ -1274,9 +1312,9 @@ def require_inside(name: str, claim: Any, found: Interval) -> None:
     """Require that a claimed enclosure (low, high) holds the proved one (least, most).
 
     Raises:
-        Unreadable: the claim is no pair of decimals.
-        Contradicted: the number lies outside.
-        Unproved: it may.
+        Unreadable: the claim is not a pair of decimals.
+        Contradicted: the proved number lies outside the claimed enclosure.
+        Unproved: the proved number may lie outside.
     """
     ends, (least, most) = take(claim, name, list), found.ends
     require(
@@ -1314,7 +1352,7 @@ def require_form(what: str, data: Any) -> None:
     """Require that an object of a line has known fields only, each of its type.
 
     Raises:
-        Unreadable: naming the field.
+        Unreadable: a field is unknown or has another type; the message names it.
     """
     require(isinstance(data, dict), Unreadable(f"{what} must be an object"))
     for name, value in data.items():
@@ -1331,7 +1369,7 @@ def require_known(record: Any) -> None:
     say so.
 
     Raises:
-        Unreadable: naming the field.
+        Unreadable: a field is unknown or has another type; the message names it.
     """
     require_form("line", record)
     for answer in take(record, "expect", list):
@@ -1349,7 +1387,7 @@ def require_narrow(record: Any, digits: int) -> None:
     """Require that each enclosure of the first answer is at most 10^-digits of its larger end wide.
 
     Raises:
-        Unproved: one is wider.
+        Unproved: an enclosure is wider.
     """
     for place, step in enumerate(record["expect"][0].get("steps", []), 1):
         for name in NUMBERS:
@@ -1369,9 +1407,9 @@ def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
         bits: the precision.
 
     Raises:
-        Unreadable: it is no line of a corpus.
-        Contradicted: its claim is false.
-        Unproved: its claim is open.
+        Unreadable: the line has not the form of a corpus line.
+        Contradicted: the claim is false.
+        Unproved: the claim is open.
     """
     first, *others = take(record, "expect", list) or [None]
     take(first, "outcome", str)
@@ -1422,7 +1460,7 @@ def read_state(scene: Scene, data: Mapping[str, Any]) -> State:
     """Read a state.
 
     Raises:
-        Refused: a field is missing, unknown, or no number, or the wall is none of the table.
+        Refused: a field is missing, unknown or not a number, or the table has no such wall.
     """
     wall = data.get("wall")
     is_wall = wall is None or wall in WALLS[scene.table]
@@ -1439,7 +1477,7 @@ def thin(path: Sequence[Step], claimed: Any) -> Iterator[Step]:
     dt counts from the step listed before.
 
     Raises:
-        Contradicted: the stays are others.
+        Contradicted: the path has other capture intervals.
     """
     stays = list(find_stays([mark(step) for step in path]))
     kept = sorted({place for stay in stays for place in stay} | {len(path) - 1})
@@ -1466,7 +1504,7 @@ def verify_line(record: Any, digits: int | None = None) -> Verdict:
         The verdict: "proved", "false" or "not proved", and which step of the argument fails.
 
     Raises:
-        Unreadable: it is no line of a corpus.
+        Unreadable: the line has not the form of a corpus line.
     """
     require_known(record)
     read = lru_cache(partial(read_scene, take(record, "scene", dict), [WORK]))
@@ -1506,7 +1544,7 @@ def name_of(record: Any) -> str:
     """Return the id of a line as it is printed: between quotes, unless it looks like an id.
 
     Raises:
-        Unreadable: there is none.
+        Unreadable: the line has no id.
     """
     name = take(record, "id", str)
     return name if re.fullmatch(r"[\w./-]+", name, re.ASCII) else f'"{printable(name)}"'
@@ -1516,7 +1554,7 @@ def read_object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return a JSON object; of a key that comes twice one value would be lost.
 
     Raises:
-        Unreadable: one does.
+        Unreadable: a key comes twice.
     """
     require(len(dict(pairs)) == len(pairs), Unreadable("a key comes twice"))
     return dict(pairs)
@@ -1526,7 +1564,7 @@ def read_json(text: bytes) -> Any:
     """Return what a JSON text says.
 
     Raises:
-        Unreadable: it is none.
+        Unreadable: the text is not JSON, or a key comes twice.
     """
     try:
         return json.loads(text.decode("utf-8"), object_pairs_hook=read_object)
@@ -1564,7 +1602,7 @@ def verify_file(path: str, digits: int | None = None) -> Iterator[tuple[str, Ver
     """Verify each line of a corpus file.
 
     Raises:
-        Unreadable: a line is none of a corpus.
+        Unreadable: a line has not the form of a corpus line; the message has its number.
     """
     for where, line in read_lines(path):
         try:
@@ -1606,7 +1644,7 @@ def read_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line.
 
     Raises:
-        Unreadable: it is wrong.
+        Unreadable: an option is wrong.
         SystemExit: it asks for help.
     """
     parser = Options(
@@ -1648,7 +1686,7 @@ def run(options: argparse.Namespace, counts: dict[str, int]) -> int:
     """Judge files, print what is not proved, and return the exit code.
 
     Raises:
-        Unreadable: a file is none of what it should be.
+        Unreadable: a file cannot be judged.
     """
     if options.answers:
         # All files are judged, also after one in which something is false.
@@ -1735,7 +1773,7 @@ def find_truth(scene: Scene, state: State, t_end: Fraction) -> Truth:
     Raises:
         Refused: the state is bad.
         Undefined: the motion has no next step.
-        Unproved: 256 bits cannot tell.
+        Unproved: 256 bits cannot tell what comes next.
     """
     question = Unproved("nothing was tried")
     for bits in PRECISIONS[:2]:
@@ -1873,7 +1911,7 @@ def require_not_close(scene: Scene, state: State, t_end: Fraction, wall: Any) ->
     """Require that a wall is not met first when one number of the start moves by its last place.
 
     Raises:
-        Unproved: it is; then both walls are right in floating point.
+        Unproved: the wall is met first then, so in floating point both walls are right.
     """
     for name, sign in itertools.product(FIELDS, (1, -1)):
         moved = state._replace(**{name: getattr(state, name) * (1 + sign * 2 * UNIT)})
@@ -2001,7 +2039,7 @@ def judge_file(path: str, options: argparse.Namespace, counts: dict[str, int]) -
     """Judge a path, print what does not agree and a summary, and return the exit code.
 
     Raises:
-        Unreadable: the file is no path.
+        Unreadable: the file does not hold a path.
     """
     answers = read_answers(path, options.scene, options.t_end)
     report, begin = Report(options.within), time.monotonic()
@@ -2030,7 +2068,7 @@ def read_answers(path: str, scene_path: str | None = None, t_end: float | None =
     and the scene is another file.
 
     Raises:
-        Unreadable: it is none of these, or its scene or its start is refused.
+        Unreadable: the file has another form, or its scene or its start is refused.
     """
     lines = read_lines(path)
     is_table = path.endswith(".csv")
@@ -2071,7 +2109,7 @@ def read_rows(lines: Iterable[tuple[str, bytes]]) -> Iterator[tuple[str, dict[st
     """Yield the rows of a CSV file, the start as step 0. An empty wall is the horizon.
 
     Raises:
-        Unreadable: a row is no row, or the first does not name the columns.
+        Unreadable: a row has too few or too many cells, or the first row does not name the columns.
     """
     names: list[str] = []
     for where, line in lines:
@@ -2112,7 +2150,7 @@ def build_answers(
     """Return a path whose scene is proved to be valid, and whose start has all fields.
 
     Raises:
-        Unreadable: it has not.
+        Unreadable: a field is missing or unknown, or the scene or the start is refused.
     """
     unknown = [name for name in head if name not in ("scene", "state", "t_end", "steps")]
     require(not unknown, Unreadable(f"{unknown[:1]} is an unknown field of a path"))

@@ -28,7 +28,7 @@ MAX_STATEMENTS = {
     "reference": 1_346,
     "fast": 3_435,
     "theory": 2_147,
-    "conformance": 8_719,
+    "conformance": 9_109,
     "mushrooms": 3_537,
     "docs": 132,
     ".ci": 41,

@@ -717,7 +717,7 @@ class Flight:
         )
         parts = [join(start, stop)]
         while parts:
-            self.clock.spend(6 + 6 * self.bits**2 // 2**20)
+            self.clock.spend(6 + 12 * self.bits**2 // 2**20)
             part = parts.pop()
             jet, last = self.f(wall, part), self.f(wall, part.high).f
             if self.is_clear(wall, part, jet, last):

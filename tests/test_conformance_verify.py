@@ -195,7 +195,7 @@ def test_work_grows_with_precision():
         work = [verify.WORK]
         verify.check_line(line, lambda work=work: verify.read_scene(line["scene"], work), bits)
         spent.append(verify.WORK - work[0])
-    assert 8 * spent[0] < spent[1] < 32 * spent[0]
+    assert 8 * spent[0] < spent[1] < 64 * spent[0]
 
 
 CAP: dict[str, Any] = {"table": "cap", "r": 1.0}

@@ -1,6 +1,6 @@
-"""Each guard of the verifier is provoked by a line: what is bad, open or false, beside a neighbour that is not.
+"""Each guard of the verifier is provoked by a line: bad, open or false, beside a neighbour that is not.
 
-Most numbers are enclosed widely, so that lines can be written by hand: outcome, walls and stays are what counts.
+Most numbers are enclosed widely, so that lines can be written by hand: outcome, walls and stays count.
 """
 
 import math
@@ -159,7 +159,7 @@ SCENES: dict[str, list[dict[str, Any]]] = {
         {"table": "mushroom", "r": 1.0, "nu": fourier(mean=0.25), "h": 1.0},
         {**MUSHROOM, "r": fourier(), "w": fourier(mean=0.5, omega=2.0, sin=[0.01])},
         {**MUSHROOM, "r": fourier(), "w": fourier(mean=0.5, omega=None, period=6.0, sin=[0.01])},
-        {**MUSHROOM, "h": fourier(omega=None, period=2.0), "w": bang_bang([0.0, 0.5], [1.0, 0.4], [3.0, 0.5])},
+        {**MUSHROOM, "h": fourier(omega=None, period=2.0), "w": bang_bang([0, 0.5], [1, 0.4], [3, 0.5])},
     ],
     "open": [  # r - w touches 0 at an irrational phase
         {**MUSHROOM, "r": 2.0, "w": fourier(mean=1.375, cos=[0.375], sin=[0.5])},
@@ -267,7 +267,8 @@ def test_each_number_of_a_step_is_compared(name: str) -> None:
 @pytest.mark.parametrize(
     "ends",
     [None, "0.5", [], ["0.5"], ["0.5", "0.5", "0.5"], [0.5, 0.5], ["0.5", None], ["0.5", "0x1"],
-     ["0.5", "1E99999"], ["0.5", "1e0"], ["0.5", " 1"], ["0.5", "1."], ["0.5", "+1"], ["0.5", "nan"], [["0.5"], "1"]],
+     ["0.5", "1E99999"], ["0.5", "1e0"], ["0.5", " 1"], ["0.5", "1."], ["0.5", "+1"], ["0.5", "nan"],
+     [["0.5"], "1"]],
 )  # fmt: skip
 def test_a_number_is_two_decimals(ends: Any) -> None:
     found = {"outcome": "collision", "steps": [step("base") | {"dt": ends}]}

@@ -1,8 +1,8 @@
 """Starts whose next step is known by hand, beside the guards that a proof of it needs.
 
 Each row is a scene in the wire's form, a state, a horizon and what is true: the wall met first, "horizon",
-"rejected", or why it is undefined. Both sides of each bound stand side by side. The verifier and the reference
-answer all of them.
+"rejected", or why it is undefined. Both sides of each bound stand side by side. The verifier and the
+reference answer all of them.
 """
 
 import math

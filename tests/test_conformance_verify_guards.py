@@ -326,3 +326,14 @@ def test_nothing_is_divided_by_what_may_be_zero(bits: int) -> None:
     for lo, hi in ((0, 0), (0, 1), (-1, 0), (-1, 1)):
         with pytest.raises(verify.Unproved, match="divisor"):
             one / verify.Interval(lo, hi, -5, bits)
+
+
+@pytest.mark.parametrize("bits", [24, 128])
+def test_cosines_are_taken_of_narrow_phases(bits: int) -> None:
+    """Of phases as far apart as a radian or more nothing is known but that a cosine is at most 1."""
+    for part in (0.125, 0.0625):
+        low, high = verify.cos_sin(verify.Interval(0, int(part * 2**bits), -bits, bits))[0].ends
+        assert low <= 1.0 <= high
+    for width in (1, 2, 99):
+        with pytest.raises(verify.Unproved, match="phase"):
+            verify.cos_sin(verify.Interval(0, width << bits, -bits, bits))

@@ -4,6 +4,8 @@ Most numbers are enclosed widely, so that lines can be written by hand: outcome,
 """
 
 import math
+from fractions import Fraction
+from itertools import islice
 from typing import Any
 
 import pytest
@@ -337,3 +339,34 @@ def test_cosines_are_taken_of_narrow_phases(bits: int) -> None:
     for width in (1, 2, 99):
         with pytest.raises(verify.Unproved, match="phase"):
             verify.cos_sin(verify.Interval(0, width << bits, -bits, bits))
+
+
+HALF_STEM = {**STEM, "w": 0.5}
+WAVY = {**STEM, "w": fourier()}
+ROLLING = {**MUSHROOM, "w": 0.75, "h": fourier(sin=[], cos=[0.125])}
+BREATHING = {**CAP, "r": fourier(omega=3.0, sin=[], cos=[0.25])}
+# Scene, state, horizon, bits; how many steps are proved with so few, and what is then open.
+OPEN: list[tuple[dict[str, Any], dict[str, Any], float, int, int, str]] = [
+    (HALF_STEM, state(0.31, -0.58, -6.48002, 4.64), 99.0, 18, 0, "two walls are met together"),
+    (CAP, state(-0.14, 0.15, 0.049, -0.019), 7.8947, 16, 0, "whether y = 0 is crossed before the horizon"),
+    ({**MUSHROOM, "slope": 0.25}, state(-0.05, 0.33, -0.9, -0.66), 99.0, 20, 0, "whether the mouth is open"),
+    (ROLLING, state(-0.57, -0.41, 2.638, 0.82), 0.5, 16, 0, "right: f is too small"),
+    (BREATHING, state(0.05, 0.54, -0.037, -0.068), 99.0, 16, 2, "the sign of a divisor is open"),
+    (WAVY, state(1.21036, -0.5, -1.0, 0.0, t=1.0), 99.0, 16, 0, "whether the state is on wall right"),
+    (WAVY, state(1.2103677, -0.5, -1.0, 0.0, "right", t=1.0), 99.0, 16, 0, "whether the state is on wall"),
+]
+
+
+@pytest.mark.parametrize(("scene", "start", "t_end", "bits", "n", "reason"), OPEN, ids=range(len(OPEN)))
+def test_what_few_bits_leave_open_is_unproved(
+    scene: dict[str, Any], start: dict[str, Any], t_end: float, bits: int, n: int, reason: str
+) -> None:
+    """With more bits the same question goes on."""
+    table = verify.read_scene(scene, [verify.WORK])
+    given = verify.read_state(table, start)
+    steps = verify.walk(table, given, Fraction(t_end), bits)
+    for _ in range(n):
+        next(steps)
+    with pytest.raises(verify.Unproved, match=reason):
+        next(steps)
+    assert len(list(islice(verify.walk(table, given, Fraction(t_end), 256), n + 1))) == n + 1

@@ -124,6 +124,11 @@ STARTS: list[tuple[dict[str, Any], dict[str, Any], float, str]] = [
     (STEM, state(-0.5, -0.5, -0.5, -0.5), 9.0, "corner"),
     (STEM, state(0.5, -0.5, 0.5, -0.5), 1.0, "horizon"),
     (STEM, state(0.5, -0.5, 0.5, -0.5), 0.75, "horizon"),
+    # A side that its rounded place lies beyond is left all the same, and the mouth is open above it.
+    (MUSHROOM, state(-0.5 - 2.0**-22, -0.5, 2.0**-23, 1.0, "left"), 9.0, "arc"),
+    # The stem is wide while its slope is steep.
+    ({**STEM, "w": 0.125, "slope": bang_bang([0.0, 0.0], [16.0, -8.0], [48.0, -8.0], [64.0, 0.0])},
+     state(-7.0, -0.9, 1.0, 0.0, t=20.0), 99.0, "right"),
     # A place or a time so large that it may be refused.
     (CAP, state(0.0, 0.5, 0.0, -1.0, t=2.0**30 - 1), 2.0**30 + 9, "base"),
 ]  # fmt: skip

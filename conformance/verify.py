@@ -46,13 +46,18 @@ PRECISIONS = (128, 256, 512, 1024, 2048, 4096)  # bits, tried in turn
 WORK = 200_000  # units of work for a line, of some 60 microseconds each: about 12 seconds in all
 SHARE = Fraction(61, 128)  # where a stretch is cut: not in the middle, where a root may well lie
 NEAR = Fraction(1, 2**20)  # how far from its wall a state may lie, as a share of the wall's size
-LATE, LARGE = 2**30, Fraction(10**100)  # t in periods, or a number, from which one may refuse
+LATE, LARGE = 2**30, Fraction(10**100)  # |t| in periods, or a number, from which one may refuse
+MOST_WAVES, MOST_KNOTS = 16, 256  # of a law
 UNIT = Fraction(1, 2**53)  # unit roundoff of binary64: half a unit in the last place, relative
 BEYOND = Fraction(3, 2**12)  # how far past its end a search goes, as a share of its length
 WRONG = Fraction(1, 10**9)  # --answers: relative backward error beyond which a step is false
 SIDES = ("left", "right", "floor")
 WALLS = {"cap": ("arc", "base"), "stem": ("base", *SIDES), "mushroom": ("arc", "base", *SIDES)}
 FIELDS = ("t", "x", "y", "vx", "vy")  # of a state, and of an answer in floating point
+# The laws of a table, and the fields of a law. Those of OPTIONAL may be left out.
+LAWS = {"cap": ("r",), "stem": ("w", "h", "slope"), "mushroom": ("r", "w", "nu", "h", "slope")}
+LAW_FIELDS = {"wave": ("kind", "mean", "omega", "period", "cos", "sin"), "legs": ("kind", "knots")}
+OPTIONAL = ("slope", "w", "nu", "omega", "period", "cos", "sin")
 NUMBERS = ("dt", "x", "y", "vx", "vy")  # of a claimed step; dt counts from the step before
 DECIMAL = re.compile(r"-?[0-9]{1,400}(\.[0-9]{1,400})?(E[+-]?[0-9]{1,4})?")
 # Characters that a name may not hold: controls but tab and line ends, lone surrogates.
@@ -310,7 +315,8 @@ class Scene(NamedTuple):
     """A table with its laws by name; w = nu r where nu is given.
 
     What moves has one period: 2 pi / omega, or `period`, exactly. Both are None when nothing moves.
-    `work` holds one number: the units of work that are left for the line.
+    `work` holds one number: the units of work that are left for the line. `is_loose` tells that
+    more was given than `without_loose` keeps, so that one may refuse the scene.
     """
 
     table: str
@@ -318,6 +324,7 @@ class Scene(NamedTuple):
     work: list[int]
     omega: Fraction | None = None
     period: Fraction | None = None
+    is_loose: bool = False
 
 
 class Clock:
@@ -988,28 +995,38 @@ def read_scene(data: Any, work: list[int]) -> Scene:
     }
     table = data.get("table")
     require(isinstance(table, str) and table in wanted, Refused("the scene has no known table"))
-    texts = [data.get(name, "") for name in ("name", "notes")]
-    require(
-        all(isinstance(text, str) and not HIDDEN.search(text) for text in texts),
-        Refused("name and notes are texts, without control characters"),
-    )
-    # A mushroom may say null for that of `w` and `nu` which it does not give.
-    absent = {name for name in ("w", "nu") if table == "mushroom" and data.get(name) is None}
-    given = {} if table == "cap" else {"slope": 0}
-    given |= {
-        name: value
-        for name, value in data.items()
-        if name not in {"$schema", "table", "name", "notes"} | absent
-    }
-    require(set(given) in wanted[table], Refused(f"these are not the laws of a {table}"))
-    read = {name: read_law(value) for name, value in given.items()}
+    given, is_loose = without_loose(data, ("table", "name", "notes", *LAWS[table]))
+    # Texts have no effect: one that may not stand there is ignored, or refused.
+    texts = [given.pop(name, "") for name in ("name", "notes")]
+    is_loose |= not all(isinstance(text, str) and not HIDDEN.search(text) for text in texts)
+    read = {} if table == "cap" else {"slope": read_law(0)}
+    for name in (name for name in LAWS[table] if name in given):
+        law = given[name]
+        if isinstance(law, dict):
+            is_legs = law.get("kind") == "bang-bang"
+            law, is_more = without_loose(law, LAW_FIELDS["legs" if is_legs else "wave"])
+            is_loose |= is_more
+        read[name] = read_law(law)
+    require(set(read) in wanted[table], Refused(f"these are not the laws of a {table}"))
     rates = {rate for law, rate in read.values() if law.ends[0] < law.ends[1]}
     require(len(rates) < 2, Refused("laws that move must share one period"))
-    scene = Scene(
-        table, {name: law for name, (law, _) in read.items()}, work, *(rates.pop() if rates else ())
-    )
+    laws, rate = {name: law for name, (law, _) in read.items()}, rates.pop() if rates else ()
+    scene = Scene(table, laws, work, *rate)._replace(is_loose=is_loose)
     require_valid(scene)
     return scene
+
+
+def without_loose(data: dict[str, Any], fields: Sequence[str]) -> tuple[dict[str, Any], bool]:
+    """Return the known fields of a scene, a law or a state, and whether there are more.
+
+    One may ignore, or refuse, a field that is unknown, and one that is optional and null.
+    """
+    kept = {
+        name: value
+        for name, value in data.items()
+        if name in fields and (value is not None or name not in OPTIONAL)
+    }
+    return kept, len(kept) < len(data)
 
 
 def read_law(data: Any) -> tuple[Law, tuple[Fraction | None, Fraction | None]]:
@@ -1020,18 +1037,17 @@ def read_law(data: Any) -> tuple[Law, tuple[Fraction | None, Fraction | None]]:
     """
     if not isinstance(data, dict):
         data = {"kind": "fourier", "mean": data, "omega": 1}
-    if data.get("kind") == "bang-bang" and set(data) == {"kind", "knots"}:
-        return read_legs(data["knots"])
-    rates = [data.get(name) for name in ("omega", "period")]  # of which one is null or absent
-    is_known = set(data) <= {"kind", "mean", "omega", "period", "cos", "sin"}
+    if data.get("kind") == "bang-bang":
+        return read_legs(data.get("knots"))
+    rates = [data.get(name) for name in ("omega", "period")]  # of which one is absent
     require(
-        data.get("kind") == "fourier" and is_known and rates.count(None) == 1,
+        data.get("kind") == "fourier" and rates.count(None) == 1,
         Refused("a law is a number, a bang-bang law, or fourier with omega or period"),
     )
     lists = [data.get(name, []) for name in ("cos", "sin")]
     require(
-        all(isinstance(waves, list) and len(waves) <= 16 for waves in lists),
-        Refused("cos and sin are lists of at most 16 numbers"),
+        all(isinstance(waves, list) and len(waves) <= MOST_WAVES for waves in lists),
+        Refused(f"cos and sin are lists of at most {MOST_WAVES} numbers"),
     )
     cos, sin = ([read_number("wave", value) for value in waves] for waves in lists)
     mean = read_number("mean", data.get("mean"))
@@ -1053,9 +1069,9 @@ def read_legs(knots: Any) -> tuple[Law, tuple[None, Fraction]]:
     """
     require(
         isinstance(knots, list)
-        and 2 <= len(knots) <= 256
+        and 2 <= len(knots) <= MOST_KNOTS
         and all(isinstance(knot, list) and len(knot) == 2 for knot in knots),
-        Refused("knots are 2 to 256 pairs of time and value"),
+        Refused(f"knots are 2 to {MOST_KNOTS} pairs of time and value"),
     )
     pairs = [(read_number("knot", t), read_number("knot", value)) for t, value in knots]
     values, legs = [value for _, value in pairs], []
@@ -1145,12 +1161,21 @@ class Step(NamedTuple):
 def walk(scene: Scene, state: State, t_end: Fraction, bits: int) -> Iterator[Step]:
     """Follow a particle from collision to collision, up to the horizon.
 
+    A state at the horizon has arrived, even where it has no next step.
+
     Raises:
         Refused: the state is bad.
         Undefined: the first step has no answer.
         Unproved: this precision cannot tell what comes next.
     """
-    flight, in_cap = start(scene, state, t_end, bits)
+    try:
+        flight, in_cap = start(scene, state, t_end, bits)
+    except Undefined:
+        if state.t < t_end:
+            raise
+        there = {name: number(value, bits) for name, value in zip(NUMBERS, state[:5], strict=True)}
+        yield Step(None, there | {"dt": number(0, bits)})
+        return
     while hit := flight.event(in_cap=in_cap):
         numbers, later = bounce(flight, hit)
         (_, _, vx, vy), excess = flight.line, None
@@ -1237,20 +1262,16 @@ def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
         Contradicted: its claim is false.
         Unproved: its claim is open.
     """
-    first, *others = take(record, "expect", list) or [None]
-    take(first, "outcome", str)
+    first, others = claim_of(record)
     state, steps = take(record, "state", dict), take({"steps": [], **first}, "steps", list)
     kind, count = take(record, "kind", str), record.get("collisions", 1)
     is_kind = kind in ("step", "trajectory", "flow") and type(count) is int and 0 < count < 10**6
     require(is_kind and (kind != "step" or count == 1), Unreadable("kind or collisions are none"))
-    found, reason, allowed, listed = [], "", [], ["steps"]
+    found, reason, listed = [], "", ["steps"]
+    allowed: list[dict[str, str]] = []  # beside the right answer
     try:
         scene = read()
         given, t_end = read_state(scene, state), read_number("t_end", record.get("t_end"))
-        # 44 / 7 is a little more than 2 pi. Where nothing moves, times count in units.
-        period = scene.period or (Fraction(44, 7) / scene.omega if scene.omega else 1)
-        is_extreme = abs(given.t) >= LATE * period or max(map(abs, given[:5])) >= LARGE
-        allowed = [{"outcome": "rejected"}] if is_extreme else []
         # A flow lists some steps of its path. Any other path is followed as far as it is listed.
         limit = count if kind == "flow" else min(count, len(steps) + 1)
         found = list(itertools.islice(walk(scene, given, t_end, bits), limit))
@@ -1277,21 +1298,68 @@ def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
             claim.get("wall") == step.wall,
             Contradicted(f"step {place} ends at {step.wall or 'the horizon'}"),
         )
+    if right["outcome"] != "rejected":
+        _, is_more = without_loose(state, (*FIELDS, "wall"))
+        if scene.is_loose or is_more or is_extreme(scene, given, bits):
+            allowed.append({"outcome": "rejected"})
+    require_listed(others, allowed)
+
+
+def claim_of(record: Any) -> tuple[Any, list[Any]]:
+    """Return the answer of a line that is to be proved, which does more than refuse if one does.
+
+    Returns:
+        It, and the further answers.
+    """
+    answers = take(record, "expect", list) or [None]
+    outcomes = [take(answer, "outcome", str) for answer in answers]
+    place = next((i for i, outcome in enumerate(outcomes) if outcome != "rejected"), 0)
+    return answers[place], answers[:place] + answers[place + 1 :]
+
+
+def require_listed(others: Sequence[Any], permitted: Sequence[Any]) -> None:
+    """Require that a line lists each further answer that the rules permit, once, and no other.
+
+    Raises:
+        Contradicted: it does not.
+    """
     require(
-        all(other in allowed for other in others), Contradicted("no rule permits a further answer")
+        all(other in permitted for other in others),
+        Contradicted("no rule permits a further answer"),
     )
+    for answer in permitted:
+        why = f"{answer['outcome']} is permitted, too, and must be listed once"
+        require(others.count(answer) == 1, Contradicted(why))
+
+
+def is_extreme(scene: Scene, state: State, bits: int) -> bool:
+    """Tell whether one may refuse a state because its time is so late, or a number so large.
+
+    Lateness is |t| in periods, or in units of time where nothing moves. |t| >= LATE 2 pi / omega
+    is asked as |t| omega / (2 LATE) >= pi, with pi enclosed.
+
+    Raises:
+        Unproved: this precision cannot tell.
+    """
+    if max(map(abs, state[:5])) >= LARGE:
+        return True
+    if not scene.omega:
+        return abs(state.t) >= LATE * (scene.period or 1)
+    excess = number(abs(state.t) * scene.omega / (2 * LATE), bits) - pi(bits)
+    require(excess.sign != 0, Unproved("whether the start is so late that one may refuse it"))
+    return excess.sign > 0
 
 
 def read_state(scene: Scene, data: Mapping[str, Any]) -> State:
-    """Read a state.
+    """Read a state; fields that are unknown are ignored.
 
     Raises:
-        Refused: a field is missing, unknown, or no number, or the wall is none of the table.
+        Refused: a field is missing, or no number, or the wall is none of the table.
     """
     wall = data.get("wall")
     is_wall = wall is None or wall in WALLS[scene.table]
     require(
-        is_wall and set(data) | {"wall"} == {*FIELDS, "wall"},
+        is_wall and set(FIELDS) <= set(data),
         Refused("a state has t, x, y, vx, vy and null or a wall of the table"),
     )
     return State(**{name: read_number(name, data[name]) for name in FIELDS}, wall=wall)

@@ -287,7 +287,7 @@ def export(
 
     The run is read block by block and its checksums are tested. A damaged run is refused.
     """
-    from mushrooms.store.run import export_run
+    from mushrooms.store.export import export_run
 
     export_run(run, to)
 
@@ -419,6 +419,9 @@ def check(
     answers: Annotated[
         Path | None, file("Grade these answers to the file of --questions.", metavar="PATH")
     ] = None,
+    corpus: Annotated[
+        str | None, typer.Option(metavar="VERSION", help="Refuse to run with another corpus than this.")
+    ] = None,
 ) -> int:
     """Test a stepper in any language. COMMAND starts it; it speaks protocol 1 on stdin and stdout.
 
@@ -427,8 +430,9 @@ def check(
 
     Exit code 0 if everything passes, 1 if something fails, 2 if the options or the suite are at fault.
     """
-    from mushrooms.check import check_stepper
+    from mushrooms.check import check_stepper, require_corpus
 
+    require_corpus(corpus)
     files = {"json": json_file, "junit": junit, "html": html, "badge": badge, "summary": summary}
     return check_stepper(
         command or [],
@@ -457,7 +461,7 @@ def verify(
 ) -> int:
     """Check a trajectory computed in floating point. Each step is judged from the state before it.
 
-    Exit code 0 if every step is proved, 1 if one is not, 2 on bad input.
+    Exit code 0 if every step is within the bound of errors, 1 if one is not or is open, 2 on bad input.
     """
     from mushrooms.questions import verify_file
 

@@ -28,7 +28,8 @@ from conformance.suite.run import N_FRESH, Transform, draw_transform
 from conformance.suite.session import Session, outcomes_of
 from conformance.suite.sheet import read_number, read_rows
 from mushrooms.check import format_outcome
-from mushrooms.output import announce_compilation, check_file, new_console, progress_bar
+from mushrooms.output import announce_compilation, check_file, new_console, print_table, progress_bar
+from mushrooms.tables import check_digest
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined, from_data
 from scene.refusal import shown
 
@@ -151,14 +152,13 @@ def _row(tally: Any) -> dict[str, Any]:
 
 def _print(tallies: list[Any]) -> None:
     heads = ("cases", "agreed", "undecided", "refused", "open", "wrong", "worst ulps", "slowest s")
-    # The name is needed to ask again: a narrow terminal cuts the heads instead.
     table = Table(Column("family", no_wrap=True), *heads, title="Attacks: verdicts of all steppers asked")
     for tally in tallies:
         counts = [str(count) for count in tally.counts.values()]
         table.add_row(
             tally.family, str(tally.n_cases), *counts, f"{tally.worst_ulps:.3g}", f"{tally.slowest:.2f}"
         )
-    new_console().print(table)
+    print_table(new_console(), table)
     for tally in tallies:
         for kind in ("open", "wrong"):
             for case in tally.cases[kind]:
@@ -192,14 +192,19 @@ def verify_file(file: Path, scene: str | None, picture: Path | None) -> int:
 
 
 def _of_rows(file: Path, label: str, scene: str) -> dict[str, Any]:
-    """Return a CSV file as the verifier takes a trajectory."""
-    states = []
-    for place, row in read_rows(file, label, FIELDS):
+    """Return a CSV file as the verifier takes a trajectory; each row but the first names the wall it hit."""
+    of = scene_named(scene)
+    check_digest(file, label)
+    states: list[dict[str, Any]] = []
+    for place, row in read_rows(file, label, (*FIELDS, "wall")):
         numbers = {name: read_number(place, name, row[name]) for name in FIELDS}
-        states.append({**numbers, "wall": row.get("wall") or None})
+        if states and row["wall"] not in of.walls:
+            given = shown(row["wall"]) if row["wall"] else "empty"
+            raise BadInput(f"{place}: wall is {given}, must be the wall that was hit: {', '.join(of.walls)}")
+        states.append({**numbers, "wall": row["wall"] or None})
     if not states:
         raise BadInput(f"{label}: there is no row")
-    return {"scene": wire_form(scene_named(scene)), "state": states[0], "steps": states[1:]}
+    return {"scene": wire_form(of), "state": states[0], "steps": states[1:]}
 
 
 def _draw(data: dict[str, Any], at: int) -> bytes:
@@ -212,4 +217,4 @@ def _draw(data: dict[str, Any], at: int) -> bytes:
     found = reference.next_collision(scene, state, float(data.get("t_end", 1e300)))
     if not isinstance(found, reference.Collision | reference.Horizon):
         raise BadInput(f"--picture: step {at + 1} from {shown(str(state))} has no certified end to draw")
-    return check_page.draw_step(scene, state, found.rounded(), given)
+    return check_page.draw_step(scene, state, found.rounded(), given, at + 1)

@@ -115,7 +115,7 @@ def test_a_path_after_which_nothing_is_defined():
 def test_a_step_has_the_answers_that_are_right():
     stem = made.from_data({"table": "stem", "w": 1.0, "h": 1.0})
     corner = measured_step(stem, State(0.0, 0.5, -0.5, 0.5, -0.5), 9.0)
-    assert [known.outcome for known in corner.expect] == ["undefined", "undecided"]
+    assert (corner.expect[0].outcome, corner.expect[0].reason) == ("undefined", "corner")
     assert corner.condition == math.inf
     assert measured_step(stem, State(0.0, 2.0, -0.5, 0.5, -0.5), 9.0).expect == (Expectation("rejected"),)
     arrived = measured_step(stem, State(1.0, 0.25, -0.5, 0.25, -0.25), 2.0)

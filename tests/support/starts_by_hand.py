@@ -15,7 +15,8 @@ MUSHROOM: dict[str, Any] = {"table": "mushroom", "r": 1.0, "w": 0.5, "h": 1.0}
 
 def fourier(**fields: Any) -> dict[str, Any]:
     """Return a law that swells by a quarter, but for the fields given."""
-    return {"kind": "fourier", "mean": 1.0, "omega": 1.0, "sin": [0.25]} | fields
+    law = {"kind": "fourier", "mean": 1.0, "omega": 1.0, "sin": [0.25]} | fields
+    return {name: value for name, value in law.items() if value is not None}
 
 
 def bang_bang(*knots: Any) -> dict[str, Any]:

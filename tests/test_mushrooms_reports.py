@@ -7,7 +7,6 @@ import json
 import math
 import re
 import statistics
-from inspect import signature
 from pathlib import Path
 
 import msgspec
@@ -321,8 +320,7 @@ def test_a_flow_shows_where_it_ends(figures):
 def test_a_step_is_drawn_from_its_start_to_both_ends_with_its_direction(figures):
     state, truth = State(0.0, 0.1, 0.2, 3.0, 4.0), Horizon(1.0, 0.5, 0.6, 1.0, -1.0)
     given = {"x": 0.5, "y": 0.62, "vx": 1.0, "vy": 1.0}
-    numbered = "number" in signature(check_page.draw_step).parameters  # of the step, in a title
-    check_page.draw_step(load("moving-cap"), state, truth, given, *([1] if numbered else []))
+    check_page.draw_step(load("moving-cap"), state, truth, given, "step 1")
     whole, close = figures[0].axes[:2]
     for axes in (whole, close):
         assert path_of(axes, "certified").tolist() == [[0.1, 0.2], [0.5, 0.6]]

@@ -105,7 +105,7 @@ def test_notes_of_an_error_are_told_in_its_line(monkeypatch, command_line):
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize(("is_ignored", "code"), [(True, 0), (False, 130)])
 def test_a_signal_that_is_ignored_stays_ignored(monkeypatch, command_line, name, is_ignored, code):
-    """`nohup` ignores the terminal that closes; others end as if by the keyboard. After it all is as before."""
+    """`nohup` ignores the terminal that closes; others end as by the keyboard. Then all is as before."""
     number = getattr(signal, name)
     usual = signal.default_int_handler if name == "SIGINT" else signal.SIG_DFL
     before = signal.signal(number, signal.SIG_IGN if is_ignored else usual)
@@ -539,6 +539,34 @@ def test_an_output_that_is_a_folder_is_refused(command_line, tmp_path, monkeypat
 )  # fmt: skip
 def test_a_duration_has_the_unit_that_suits_it(seconds, text):
     assert output.format_duration(seconds) == text
+
+
+class Terminal(io.StringIO):
+    """A stream that is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_progress_goes_to_standard_error_as_a_bar_or_as_lines(capsys, monkeypatch, is_terminal):
+    """Also while the clock stands still: then the time that is left is unknown."""
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setattr(output, "CLOCK", lambda: 7.0)
+    monkeypatch.setattr(output, "FIRST", 0.0)
+    monkeypatch.setattr(output, "EVERY", 0.0)
+    told = Terminal() if is_terminal else io.StringIO()
+    monkeypatch.setattr(sys, "stderr", told)
+    with output.progress_bar() as bar:
+        watch = output.Watch(bar, "run", "particles")
+        watch.update(1000, 2000)
+        watch.update(1500, 2000)
+    lines = told.getvalue()
+    assert capsys.readouterr().out == ""
+    assert ("run: 1,000 of 2,000 particles, time left unknown" in lines) is not is_terminal
+    assert ("run: 1,500 of 2,000 particles, 1e-09 seconds left" in lines) is not is_terminal
+    assert ("1500/2000" in lines) is is_terminal
 
 
 def test_pairs_are_lines_with_their_meanings(capsys):

@@ -565,7 +565,7 @@ def test_progress_goes_to_standard_error_as_a_bar_or_as_lines(capsys, monkeypatc
     lines = told.getvalue()
     assert capsys.readouterr().out == ""
     assert ("run: 1,000 of 2,000 particles, time left unknown" in lines) is not is_terminal
-    assert ("run: 1,500 of 2,000 particles, 1e-09 seconds left" in lines) is not is_terminal
+    assert ("run: 1,500 of 2,000 particles, " in lines) is not is_terminal
     assert ("1500/2000" in lines) is is_terminal
 
 

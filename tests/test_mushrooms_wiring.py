@@ -354,7 +354,9 @@ def test_limits_stop_a_run_between_blocks(tmp_path, monkeypatch):
 def test_blocks_take_seconds_of_what_is_to_be_expected(monkeypatch):
     """A power of two between the least and the most, so that a block makes some 2e8 collisions."""
     one = RunSpec(STEM, 40.0, 1, 7)
-    for each, wanted in ((1e4, 16384), (1e9, 256), (1.0, 2**17), (math.nan, 256), (math.inf, 256)):
+    for each, wanted in (
+        (1e4, 16384), (1e9, 256), (1.0, 2**17), (0.0, 2**17), (math.nan, 256), (math.inf, 256),
+    ):  # fmt: skip
         monkeypatch.setattr(conduct, "expected_collisions", lambda *_, each=each: each)
         monkeypatch.setattr(conduct, "BLOCK_BYTES", 2**40)
         assert conduct.block_size(one, 1) == wanted
@@ -362,6 +364,8 @@ def test_blocks_take_seconds_of_what_is_to_be_expected(monkeypatch):
     monkeypatch.setattr(conduct, "BLOCK_BYTES", 3000 * shape_of(one, 1, 1).bytes_of_a_particle)
     monkeypatch.setattr(conduct, "expected_collisions", lambda *_: 1.0)
     assert conduct.block_size(one, 1) == 2048
+    monkeypatch.setattr(conduct, "BLOCK_BYTES", 1)  # less than one particle needs
+    assert conduct.block_size(one, 1) == 1
     monkeypatch.setattr(conduct, "BLOCK_BYTES", 2**40)
     assert [conduct.block_of_new(one, n, 1) for n in (1, 4096, 4097, 10**9)] == [4096, 4096, 8192, 2**17]
     with pytest.raises(BadInput, match=r"--block = 2: 2000001 particles need blocks of at least 3"):

@@ -1,7 +1,7 @@
 """Given particles: paths from collision to collision, in binary64 or to 31 decimals; until an event; a flow.
 
 A trajectory carries its time as a sum of two floats, and takes the steps of the lanes where they are shown
-right (fast.kernel.follow). A fine trajectory carries all its numbers so (fast.kernel.fine_step). Events are
+right (fast.kernel.path). A fine trajectory carries all its numbers so (fast.kernel.fine_step). Events are
 sought among the collisions of a trajectory: the arc hit with which a capture interval begins, the hit with
 which it ends, or the hit after which an energy is reached. A flow carries particles to a time, as ensembles
 are followed.
@@ -22,7 +22,8 @@ from mpmath import fp
 from fast.ensemble import follow_many, least_collisions, only_stop
 from fast.kernel import records
 from fast.kernel.fine_step import FineState, fine_path
-from fast.kernel.follow import PATHS, follow_particles
+from fast.kernel.follow import follow_particles
+from fast.kernel.path import PATHS
 
 from fast.kernel.records import (  # isort: skip
     ANCHORS_SHAPE, ANSWER_LOST, Compiled, FloatArray, IntArray, Particle, unfilled_ends,

@@ -1,0 +1,152 @@
+"""Following one particle from collision to collision (`PATHS`), by the arithmetic of the SIMD lanes.
+
+A lane computes what each wall asks for and then chooses; one particle alone asks only for what its wall
+needs. Each number is found by the same operations, so that it is the same to the bit: `aim_alone` is `aim`
+with branches, and `fly_alone` tells `land` in each branch which wall is met, so that the compiler leaves out
+what the others ask for.
+"""
+
+import numpy as np
+
+from fast.kernel.arithmetic import fma
+from fast.kernel.compiling import HOW, kept, packed, part
+from fast.kernel.follow import careful_flight, knows_laws, land_carefully
+from fast.kernel.lane_laws import ONE_WAVE, TWO_WAVES, laws_in, look_ahead, set_reference
+
+from fast.kernel.lanes import (  # isort: skip
+    ONE, arc_quotient, cube_of_arc, land, mouth_crossing, nearest_below, outset_of, side_bend,
+    side_curvature,
+)  # fmt: skip
+from fast.kernel.records import (  # isort: skip
+    ANSWER_LOST, COARSE, END, FAR, FATE, HIT, HORIZON, MARKED, MAX_CORRECTIONS, MOVED, ON_ARC,
+    ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, S, STEM, STOP, SURE, T, TRIES, T_LOW, WALL, load,
+    particle_at, particle_of, put_particle, write_state, write_step,
+)  # fmt: skip
+from fast.kernel.scalar_step import NEAR
+from fast.kernel.worker import FORMS, GENERAL
+
+FIRST = np.int64(0)  # the lane in use
+
+
+@packed
+def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
+    """Choose the wall and guess the time, as `aim` does; returns the wall."""
+    outset, now = outset_of(a, FIRST), laws_in(a, R0 + FIRST, waves, is_relative, slope, degree)
+    _, y, _, vy, wall, _, _ = outset
+    depth, rise = abs(y), abs(vy)
+    k_side = side_curvature(vy, slope, limits)
+    sure, root = 1.0, 1.0
+    if wall <= ON_BASE and not is_stem:
+        f, d, root = arc_quotient(outset, now.r, now.r1, now.r2)
+        hit = ON_ARC
+        if vy < 0.0 and not fma(y, d, vy * f) > 0.0:
+            gap, doubt = mouth_crossing(outset, now.w, now.w1, k_side, limits)
+            sure, root = abs(gap * rise) - doubt, 1.0
+            f, d, hit = nearest_below(outset, now, slope) if gap > 0.0 else (depth, rise, ON_BASE)
+    else:
+        f, d, hit = nearest_below(outset, now, slope)
+        is_crossing = vy > 0.0 and not fma(depth, d, -f * vy) > 0.0
+        if is_crossing and is_stem:
+            f, d, hit = depth, rise, ON_BASE
+        elif is_crossing:
+            gap, doubt = mouth_crossing(outset, now.w, now.w1, k_side + limits.lift, limits)
+            f, d, root = arc_quotient(outset, now.r, now.r1, now.r2)
+            sure, hit = gap * rise - doubt, ON_ARC
+    inverse = ONE / (d * root)
+    s, beyond = f * (root * inverse), 0.0
+    if hit == ON_ARC:
+        beyond = cube_of_arc(now.r, now.r1, now.r2, now.r3) * s * s * d
+    elif hit == ON_FLOOR:
+        beyond = now.h2 * s
+    elif hit != ON_BASE:
+        beyond = side_bend(y, vy, now, slope) * s
+    a[S] = a[S] if a[TRIES] > 0.0 else s * fma(0.5 * beyond, inverse, 1.0)
+    a[SURE] = sure
+    return hit
+
+
+@packed
+def land_on(a, hit, is_stem, is_relative, waves, slope, degree, limits):
+    """Take the step to a wall, if that is shown right; stays are of no interest."""
+    a[HIT] = hit
+    land(a, FIRST, (is_stem, False, is_relative), waves, slope, degree, limits)
+
+
+@packed
+def fly_alone(a, is_stem, is_relative, waves, slope, degree, limits):
+    """Find the next collision, and take the step where it is shown right, as `fly` does."""
+    scene = is_stem, is_relative, waves, slope, degree, limits
+    hit = aim_alone(a, *scene)
+    look_ahead(a, FIRST, a[S], waves, is_relative, slope, degree)
+    if hit == ON_ARC:
+        land_on(a, ON_ARC, *scene)
+    elif hit == ON_BASE:
+        land_on(a, ON_BASE, *scene)
+    elif hit == ON_LEFT:
+        land_on(a, ON_LEFT, *scene)
+    elif hit == ON_RIGHT:
+        land_on(a, ON_RIGHT, *scene)
+    else:
+        land_on(a, ON_FLOOR, *scene)
+
+
+@part
+def next_hit(a, worker, waves, slope, degree):
+    """Take the next step of the particle in the first lane; returns its wall, or what comes instead.
+
+    The lanes' answer is taken unless the end may come before: there the scalar step looks from both sides.
+    """
+    limit = (worker.stops.times[-1] - a[T]) - a[T_LOW]
+    a[STOP] = min(a[T] + limit * (1.0 - 4.0 * NEAR), worker.laws.pieces.until)
+    is_stem, is_relative = worker.laws.scene.table == STEM, worker.laws.scene.is_relative
+    while knows_laws(a, FIRST, worker):
+        fly_alone(a, is_stem, is_relative, waves, slope, degree, worker.laws.limits)
+        if a[FATE] == MOVED or a[FATE] == MARKED:
+            if a[T] >= a[END]:
+                set_reference(a, FIRST, a[T], a[T_LOW], worker.laws)
+            return int(a[WALL])
+        if a[FATE] == FAR and a[TRIES] <= MAX_CORRECTIONS:
+            set_reference(a, FIRST, a[T] + a[S], a[T_LOW], worker.laws)
+        elif a[FATE] != COARSE:
+            break
+    code, s, p = careful_flight(a, FIRST, worker)
+    if code < HORIZON:
+        land_carefully(GENERAL, a, FIRST, code, s, p, worker)
+    else:
+        put_particle(a, FIRST, p)
+    return code
+
+
+def _path(is_slope_moving, form):
+    degree, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
+
+    @kept(is_slope_moving, form, nogil=True, **HOW)
+    def follow_path(worker, wall, factors, steps, walls):
+        """Follow a worker's one particle through as many collisions as there is room for in steps and walls.
+
+        Returns:
+            How many there are, and the last wall's code or what came instead: ANSWER_LOST before a step that
+            loses a bit by `factors`, see `write_step`.
+        """
+        laws = worker.laws
+        waves, slope = laws.waves if is_waves else None, None if is_slope_moving else laws.slope
+        states, a = worker.followed.states, worker.pools[GENERAL]
+        load(a, FIRST, particle_at(states, 0, wall), False)
+        code, n = wall, 0
+        while n < steps.shape[0] and worker.stops.called_off[0] == 0:
+            code = next_hit(a, worker, waves, slope, degree)
+            if code >= HORIZON:
+                break
+            if not write_step(steps, n, factors, a[S], particle_of(a, FIRST)):
+                code = ANSWER_LOST
+                break
+            walls[n] = code
+            n += 1
+        write_state(states, 0, particle_of(a, FIRST))
+        return n, code
+
+    return follow_path
+
+
+# By whether the slope moves, and by the form of the laws.
+PATHS = {(moves, form): _path(moves, form) for moves in (False, True) for form in FORMS}

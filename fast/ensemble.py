@@ -22,6 +22,7 @@ from mpmath import fp
 
 from fast.kernel import records
 from fast.kernel.arithmetic import directions
+from fast.kernel.fates import FATES, MOST_TO_A_TIME, Fate
 from fast.kernel.follow import LANE_ROWS, follow_particles
 from fast.kernel.records import BoolArray, FloatArray, Followed, IntArray, LawsInLanes, Stops, unfilled_ends
 from fast.kernel.single import LARGEST
@@ -30,10 +31,10 @@ from fast.pieces import laws_in_lanes
 from fast.units import Units, fit, inward, outward
 
 from fast.validation import (  # isort: skip
-    MAX_CYCLES, MAX_FIRST, MAX_PARTICLES, MOST_IN_CYCLES, MOST_TO_A_TIME, check_energy, check_kept,
+    MAX_CYCLES, MAX_FIRST, MAX_PARTICLES, MOST_IN_CYCLES, check_energy, check_kept,
     check_phases, check_progress, check_threads,
 )  # fmt: skip
-from scene import Scene, check_scene
+from scene import Horizon, Rejected, Scene, Undecided, Undefined, check_scene
 from scene.geometry import table_at
 from scene.laws import bounds
 from scene.mouth import mouth_minima, start_time
@@ -42,6 +43,15 @@ from scene.refusal import BadInput, check_count, shown
 from scene.tables import laws
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
+KINDS: dict[type[Any], int] = {
+    Horizon: FOLLOWED,
+    Undecided: UNDECIDED,
+    Undefined: UNDEFINED,
+    Rejected: REJECTED,
+}
+OUTCOMES = np.full(1 + max(FATES), REJECTED, np.int8)  # by the code of a fate
+for fate in Fate:
+    OUTCOMES[fate.code] = KINDS[fate.outcome]
 SHARE = 256  # particles a worker takes at a time, for each cycle: several times what it holds at once
 
 
@@ -428,8 +438,8 @@ def _share(n: int, threads: int, n_cycles: int) -> int:
 
 def outcomes(ends: IntArray) -> npt.NDArray[np.int8]:
     """Return 0, 1, 2, 3 for particles followed to the end, undecided, undefined, rejected."""
-    kinds = [ends == records.HORIZON, ends < records.FAR_TIME, ends < records.APPROACHING]
-    return np.select(kinds, [FOLLOWED, UNDEFINED, UNDECIDED], REJECTED).astype(np.int8)
+    found: npt.NDArray[np.int8] = OUTCOMES[ends]
+    return found
 
 
 def follow_many(
@@ -542,7 +552,7 @@ def go_on(
     _check_same(asked if before.asked is None else before.asked, asked)
     n_before, n_passed = _passed(plan, before)
     done, seconds = plan.followed(np.full((n_particles, 6), np.nan), LANE_ROWS, before.lanes, n_passed)
-    after, anew = plan.ensemble(done, seconds), np.flatnonzero(done.codes == records.ANEW)
+    after, anew = plan.ensemble(done, seconds), np.flatnonzero(done.codes == records.FOLLOW_ANEW)
     for name in BY_CYCLE:
         getattr(after, name)[:, :n_before] = getattr(before.ensemble, name)
     if len(anew):

@@ -21,6 +21,7 @@ from mpmath import fp
 
 from fast.ensemble import follow_many, least_collisions, only_stop
 from fast.kernel import records
+from fast.kernel.fates import MOST_TO_A_TIME, Fate
 from fast.kernel.fine_step import FineState, fine_path
 from fast.kernel.follow import follow_particles
 from fast.kernel.path import PATHS
@@ -37,7 +38,7 @@ from fast.step import (  # isort: skip
 from fast.units import LateTime, Units, fit, scaled
 
 from fast.validation import (  # isort: skip
-    MAX_STEPS, MOST_TO_A_TIME, check_end, check_energy, check_states, check_threads,
+    MAX_STEPS, check_end, check_energy, check_states, check_threads,
 )  # fmt: skip
 from scene import InvalidState, Mushroom, Outcome, Rejected, Scene, State, Undecided, Wall, check_scene
 from scene.geometry import half_width
@@ -95,7 +96,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     halves = np.stack([exponents // 2, exponents - exponents // 2])
     factors = np.ldexp(1.0, np.vstack([halves, -halves]))
     steps, walls = np.empty((n_collisions, 6)), np.empty(n_collisions, np.int64)
-    kernel = PATHS[in_lanes.is_slope_moving, in_lanes.degree]
+    kernel = PATHS[in_lanes.is_slope_moving, in_lanes.form]
     with np.errstate(over="ignore", under="ignore"):  # without the compiler
         n, code = follow_path(kernel, (worker, wall, factors, steps, walls), n_collisions, stop.called_off)
     steps = steps[:n] if n == n_collisions else steps[:n].copy()  # not all room is held
@@ -181,7 +182,7 @@ def as_trajectory(
     found, is_kept = scaled(steps[:n], units.of_step()[:, None])
     n_exact = int(np.append(is_kept.all(axis=(1, 2)), False).argmin())
     if n_exact < n:
-        n, code = n_exact, ANSWER_LOST
+        n, code = n_exact, Fate.ANSWER_LOST.code
     outcome: Outcome | None = None
     if n < len(steps):
         outcome = end_of_path(code, scene, state, n, np.inf, place_after(found[:n, :, 0], state))

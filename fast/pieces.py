@@ -72,6 +72,7 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
         pieces,
         waves or NO_WAVES,
         form,
+        is_waves=waves is not None,
         is_slope_moving=bool(laws[SLOPE, KIND] != CONSTANT),
         slope=float(laws[SLOPE, LEVEL]),
     )

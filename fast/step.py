@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from fast.kernel import records, scalar_step, single
+from fast.kernel import records, single
+from fast.kernel.fates import FATES, Fate
 from fast.kernel.records import FloatArray, IntArray, Particle
 from fast.kernel.worker import careful_at
-from fast.units import ANSWER_LOST, LateTime, Units, fit
-from fast.validation import MOST_TO_A_TIME
+from fast.units import LateTime, Units, fit
 from scene import (
     BadInput,
     Collision,
@@ -22,7 +22,6 @@ from scene import (
     Scene,
     State,
     Undecided,
-    Undefined,
     Wall,
     check_scene,
 )
@@ -36,21 +35,8 @@ WALL_NAMES: dict[int, Wall] = {
     int(records.RIGHT): "right",
     int(records.FLOOR): "floor",
 }
+BEYOND: dict[Fate, Wall] = {FATES[Fate.BEYOND_ARC.code + code]: wall for code, wall in WALL_NAMES.items()}
 WALL_CODES: dict[Wall | None, int] = {None: int(records.NO_WALL)} | {n: c for c, n in WALL_NAMES.items()}
-REASONS: dict[int, Outcome] = {
-    int(records.SLIDING): Undefined("sliding"),
-    int(records.MOUTH_EDGE): Undefined("mouth-edge"),
-    int(records.ON_CORNER): Undefined("corner"),
-    int(records.TOO_MANY): Undecided(f"no hit within {scalar_step.MAX_PARABOLAS} sub-intervals"),
-    int(records.TANGENT): Undecided("f and f' vanish together within rounding"),
-    int(records.CORNER): Undecided("two walls are hit together within rounding"),
-    int(records.EDGE): Undecided("the mouth's edge is hit within rounding"),
-    int(records.AT_END): Undecided("a wall is hit at the horizon within rounding"),
-    int(records.START): Undecided("the state is on another wall within rounding"),
-    int(records.TOO_FAR): Undecided(f"t_end is over {MOST_TO_A_TIME:.0e} collisions away"),
-    int(records.ANSWER_LOST): Undecided(ANSWER_LOST),
-    int(records.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
-}
 
 
 def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
@@ -138,16 +124,18 @@ def end_of_path(
     """
     if code == records.HORIZON:
         return Horizon(t_end, *map(float, place))
-    if code == records.START and not n:
+    fate = FATES[code]
+    if fate is Fate.NEAR_START and not n:
         wall = rounded(scene, state.t).nearest_wall(state.x, state.y, but=state.wall)
         return Undecided(placed(scene, state, wall, "within rounding of"))
     since = f"{n} collisions after state.t = {state.t!r}" if n else f"state.t = {state.t!r}"
-    if code == records.FAR_TIME:
-        return Undecided(
-            f"{since}: too late: at the highest harmonic a phase exceeds 2^27 quarter turns, which binary64"
-            " cannot resolve"
-        )
-    found = REASONS.get(code)
-    if n and (found is None or isinstance(found, Rejected)):
+    if fate is Fate.TOO_LATE:
+        return Undecided(f"{since}: {fate.value}")
+    if fate.outcome is not Rejected:
+        answer: Outcome = fate.outcome(fate.value)
+        return answer
+    if n:
         return Undecided(f"{since}: rounding puts the particle beyond a wall")
-    return found or Rejected(placed(scene, state, WALL_NAMES[int(code - records.BEYOND)], "beyond"))
+    if fate in BEYOND:
+        return Rejected(placed(scene, state, BEYOND[fate], "beyond"))
+    return Rejected(fate.value)

@@ -25,6 +25,7 @@ import numpy as np
 
 from fast.kernel import records
 from fast.kernel.arithmetic import HALF_PI, split
+from fast.kernel.fates import Fate
 from fast.kernel.single import LARGEST, LENGTH, TIME, pack_scene, static_time
 
 from fast.kernel.records import (  # isort: skip
@@ -112,9 +113,6 @@ def _product_bounds(factors: tuple[Law, ...]) -> Bounds:
         (nu.slope * r.highest + nu.highest * r.slope) * grow,
         (nu.curvature * r.highest + 2 * nu.slope * r.slope + nu.highest * r.curvature) * grow,
     )
-
-
-ANSWER_LOST = "the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023"
 
 
 class LateTime(InvalidState):
@@ -267,7 +265,7 @@ def outward(numbers: FloatArray, exponents: IntArray | int) -> FloatArray:
     """
     found, is_kept = scaled(numbers, exponents)
     if not is_kept.all():
-        raise BadInput(ANSWER_LOST)
+        raise BadInput(Fate.ANSWER_LOST.value)
     return found
 
 

@@ -277,7 +277,7 @@ def test_pieces_of_waves_that_are_rounded_where_they_cancel_are_seen(scene, monk
 def test_degrees_are_no_higher_than_it_takes():
     """Sizes that come down far are no waves, nor are more than two harmonics, or knots."""
     caps = [Cap(r=Fourier(1.0, 1.0, cos)) for cos in ((0.74,), (0.1, 0.1), (0.76,), (0.1, 0.1, 0.1))]
-    found = [laws_in_lanes(scene).degree for scene in [*caps, *DEEP]]
+    found = [laws_in_lanes(scene).form for scene in [*caps, *DEEP]]
     assert found == [ONE_WAVE, TWO_WAVES, SERIES, SERIES, *[SERIES] * 4, PARABOLA]
     assert len(laws_in_lanes(Cap(r=Fourier(1.0, 1.0, (0.8,)))).pieces.begins) >= 27
 

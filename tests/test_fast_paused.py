@@ -104,14 +104,14 @@ def test_who_cannot_go_on_is_followed_from_the_start(monkeypatch):
     assert is_right.any()
     tied.lanes[is_right, follow.FIRST_ROW] -= 0.25 * one_cycle(fit(scene).scene)
     assert is_same(fast.go_on(scene, n_cycles=3, before=tied, **asked), three)
-    monkeypatch.setattr(ensemble.records, "ANEW", 99)  # nobody is followed anew
+    monkeypatch.setattr(ensemble.records, "FOLLOW_ANEW", 99)  # nobody is followed anew
     found = fast.go_on(scene, n_cycles=3, before=tied, **asked)
     assert found.ensemble.sha256() != three.ensemble.sha256()
 
 
 def test_no_number_of_a_lane_may_be_forgotten(monkeypatch):
     """Each is needed in some run. A last state, which has six of them, is thus not enough to go on from."""
-    monkeypatch.setattr(ensemble.records, "ANEW", 99)  # nobody is followed anew
+    monkeypatch.setattr(ensemble.records, "FOLLOW_ANEW", 99)  # nobody is followed anew
     missed = set(range(follow.LANE_ROWS))
     for name in ("many harmonics", "fixed cap", "a cap alone"):
         scene, asked = SCENES[name], {"n_particles": 100, "energy": 3.0, "seed": 8, "phases": (0.3, 0.8)}

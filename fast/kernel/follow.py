@@ -26,12 +26,12 @@ from fast.kernel.lane_laws import know_laws, set_piece, set_reference
 from fast.kernel.lanes import count_hit, stay_after
 
 from fast.kernel.records import (  # isort: skip
-    ANEW, ARC, AS_GIVEN, CAP, CAPTURED, CLEARLY, END, FAR, FATE, HORIZON, LANES, LATE, LAWS,
-    MARKED, MAX_CORRECTIONS, MOVED, MUSHROOM, NEVER, NOT_YET, N_ARC, N_BASE, N_FLOOR, N_LEFT,
-    N_RIGHT, N_ROWS, N_WALLS, ON_ARC, OVER, PIECE, POOL_SIZE, R1, RADIUS, REF, S, SINCE, SPIN,
-    STAY, STAY_IN, STAY_OUT, STOP, STRIDE, T, TOO_FAR, TRIES, T_LOW, UNTIL, VALUE, VX, VY,
-    W0_LOW, WALL, WHEN, WIDTH, X, Y, Particle, copy_rows, load, particle_at, particle_of,
-    put_particle, refold, whole_registers, write_state,
+    ARC, AS_GIVEN, CAP, CAPTURED, CLEARLY, END, FAR, FATE, FOLLOW_ANEW, HORIZON, LANES, LATE,
+    LAWS, MARKED, MAX_CORRECTIONS, MOVED, MUSHROOM, NEVER, NOT_YET, N_ARC, N_BASE, N_FLOOR,
+    N_LEFT, N_RIGHT, N_ROWS, N_WALLS, ON_ARC, OVER, PIECE, POOL_SIZE, R1, RADIUS, REF, S, SINCE,
+    SPIN, STAY, STAY_IN, STAY_OUT, STOP, STRIDE, T, TOO_FAR, TRIES, T_LOW, UNTIL, VALUE, VX, VY,
+    W0_LOW, WALL, WHEN, WIDTH, X, Y, Particle, copy_rows, is_hit, is_lost, load, particle_at,
+    particle_of, put_particle, refold, whole_registers, write_state,
 )  # fmt: skip
 from fast.kernel.scalar_step import KNOWN
 from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE, run_careful, run_step
@@ -51,7 +51,9 @@ def keep_lane(pool, a, i, roster, is_known, worker):
     out[:] = 0.0
     out[POOL], out[NEXT], out[CAREFUL] = pool, roster[NEXT_STOP, i], followed.careful[j]
     out[IS_KNOWN] = 1.0 if is_known else 0.0
-    last = REF if not is_known else (R1 + STRIDE if worker.laws.degree % 2 == 1 else W0_LOW)
+    last = REF
+    if is_known:
+        last = R1 + STRIDE if worker.laws.is_waves else W0_LOW
     for k in range(last // STRIDE):
         out[FIRST_ROW + k] = a[k * STRIDE + i]
 
@@ -70,10 +72,11 @@ def take_lane(a, i, roster, j, worker):
     if a[STAY_IN + i] == NEVER:
         a[STAY + i] = NOT_YET
     a[STOP + i], a[END + i] = -NEVER, -NEVER
-    if kept[IS_KNOWN] > 0.0 and worker.laws.degree % 2 == 0:
-        set_piece(a, i, int(a[PIECE + i]), worker.laws)
-    elif kept[IS_KNOWN] > 0.0:
-        a[END + i] = NEVER
+    if kept[IS_KNOWN] > 0.0:
+        if worker.laws.is_waves:
+            a[END + i] = NEVER
+        else:
+            set_piece(a, i, int(a[PIECE + i]), worker.laws)
 
 
 STAYS, MOVES, ENDS = 0, 1, 2
@@ -212,7 +215,7 @@ def step_carefully(pool, a, i, roster, worker):
     while True:
         code, s, p = careful_flight(a, i, worker)
         followed.careful[roster[PARTICLE, i]] += 1
-        if code > HORIZON:
+        if is_lost(code):
             return code
         # Rounded, the time at the horizon may be before it.
         note_stops(a, i, roster, stops.times[-1] if code == HORIZON else p.t, stops, followed)
@@ -273,11 +276,11 @@ def code_of_attention(pool, a, i, roster, worker):
             a[END + i] = -NEVER
     else:
         code = step_carefully(pool, a, i, roster, worker)
-        code = ARC if code < HORIZON else code
+        code = ARC if is_hit(code) else code
     if roster[NEXT_STOP, i] < worker.n_passed:
         # Put back, it does not pass all stops again: the last had come within rounding of a collision, or the
         # scalar step, which now looks further, is undecided. A run at once would have written otherwise.
-        return np.int64(ANEW)
+        return np.int64(FOLLOW_ANEW)
     if code == ARC and collisions_of(a, i) > stops.most:
         if pool == DISK:
             refold(a, i)
@@ -324,7 +327,7 @@ def last_to_attend(a, n):
 @part
 def change_place(worker, pool, i, other, j):
     """Copy a lane and its entry in the roster to another place; without coefficients where laws are waves."""
-    last = POOL_SIZE if worker.laws.degree % 2 == 0 else LAWS
+    last = LAWS if worker.laws.is_waves else POOL_SIZE
     copy_rows(worker.pools[pool], i, worker.pools[other], j, T, last)
     worker.rosters[other, PARTICLE, j] = worker.rosters[pool, PARTICLE, i]
     worker.rosters[other, NEXT_STOP, j] = worker.rosters[pool, NEXT_STOP, i]
@@ -353,7 +356,7 @@ def take_in(worker, j, wall):
     n_held, followed = worker.n_held, worker.followed
     home = DISK if worker.laws.scene.table == CAP else GENERAL
     if worker.n_passed > 0 and not followed.lanes[j, 0] >= 0.0:
-        followed.codes[j] = ANEW
+        followed.codes[j] = FOLLOW_ANEW
         return
     if worker.n_passed > 0:
         home = DISK if followed.lanes[j, 0] > 0.0 else GENERAL

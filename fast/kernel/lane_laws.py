@@ -8,8 +8,8 @@ since the begin follows from the turn of the phase by sum formulas, without a di
 of a constant, a Fourier sum or a half-leg between knots, in any mixture. When a piece no longer serves, the
 lane is given the next. Why the polynomials may be trusted is said where they are cut, in fast.pieces.
 
-`waves` is None for pieces, `slope` is None where the slope moves; `degree` is a tuple as long as a form's
-number in FORMS, so that each form is compiled by itself.
+`waves` is None for pieces, `slope` is None where the slope moves; `form` is a tuple as long as a form's
+number (ONE_WAVE, TWO_WAVES, or the degree of pieces), so that each form is compiled by itself.
 """
 
 from typing import NamedTuple
@@ -124,7 +124,7 @@ def fill_pieces(laws, references, coefficients):
             out[0], out[1], out[2] = anchors[row, VALUE], anchors[row, VALUE_LOW], anchors[row, RATE]
 
 
-ONE_WAVE, TWO_WAVES = 1, 3  # odd, pieces' degrees are even
+ONE_WAVE, TWO_WAVES = 1, 3  # neither is a degree of pieces, so that a number names a form
 PIO2_REST = PIO2_2 + PIO2_3
 LONGEST_TURN = 0.75  # of the highest harmonic in a hop: `beyond_first_order` serves to pi / 4
 NO_WAVES = LaneWaves(0.0, 0.0, *[(0.0,) * 5] * 4)
@@ -172,11 +172,11 @@ def twice(sine, cosine):
 
 
 @packed
-def law_of_waves(law, sine, cosine, omega, degree):
+def law_of_waves(law, sine, cosine, omega, form):
     """Return a law and three derivatives at a fundamental phase."""
     even, odd = wave_parts(law, 1, sine, cosine)
     f, rate, bend, third = even, odd, even, odd
-    if len(degree) == TWO_WAVES:
+    if len(form) == TWO_WAVES:
         even, odd = wave_parts(law, 2, *twice(sine, cosine))
         f, rate, bend, third = f + even, fma(2.0, odd, rate), fma(4.0, even, bend), fma(8.0, odd, third)
     omega2 = -omega * omega
@@ -184,15 +184,15 @@ def law_of_waves(law, sine, cosine, omega, degree):
 
 
 @packed
-def laws_of_waves(sine, cosine, waves, is_relative, slope, degree):
+def laws_of_waves(sine, cosine, waves, is_relative, slope, form):
     """Return all laws at a fundamental phase."""
     omega = waves.omega
-    r, r1, r2, r3 = law_of_waves(waves.r, sine, cosine, omega, degree)
-    nu, nu1, nu2, _ = law_of_waves(waves.w, sine, cosine, omega, degree)
+    r, r1, r2, r3 = law_of_waves(waves.r, sine, cosine, omega, form)
+    nu, nu1, nu2, _ = law_of_waves(waves.w, sine, cosine, omega, form)
     w, w_low, w1, w2 = width_of(nu, nu1, nu2, r, r1, r2, is_relative)
-    h, h1, h2, _ = law_of_waves(waves.h, sine, cosine, omega, degree)
+    h, h1, h2, _ = law_of_waves(waves.h, sine, cosine, omega, form)
     if slope is None:
-        m, m1, m2, _ = law_of_waves(waves.m, sine, cosine, omega, degree)
+        m, m1, m2, _ = law_of_waves(waves.m, sine, cosine, omega, form)
     else:
         m, m1, m2 = slope, 0.0, 0.0
     return LawsAt(r, r1, r2, r3, w, w_low, w1, w2, h, h1, h2, m, m1, m2)
@@ -214,10 +214,10 @@ def fresh_phase(t, t_low, waves):
 
 
 @packed
-def laws_in(a, place, waves, is_relative, slope, degree):
+def laws_in(a, place, waves, is_relative, slope, form):
     """Return the laws in the rows of a lane that begin at `place`: R0 for those now, or AHEAD."""
     if waves is not None:
-        return laws_of_waves(a[place], a[place + STRIDE], waves, is_relative, slope, degree)
+        return laws_of_waves(a[place], a[place + STRIDE], waves, is_relative, slope, form)
     r, r1, r2, r3 = a[place], a[place + STRIDE], a[place + 2 * STRIDE], a[place + 3 * STRIDE]
     w, w1, w2 = a[place + 4 * STRIDE], a[place + 5 * STRIDE], a[place + 6 * STRIDE]
     h, h1, h2 = a[place + 7 * STRIDE], a[place + 8 * STRIDE], a[place + 9 * STRIDE]
@@ -245,38 +245,38 @@ def write_laws(a, place, laws, slope):
 
 
 @packed
-def look_ahead(a, i, s, waves, is_relative, slope, degree):
+def look_ahead(a, i, s, waves, is_relative, slope, form):
     """Write the laws after a flight, from AHEAD on.
 
     In a loop of its own: one loop over everything has more instructions than a processor looks ahead, so that
     it would wait for one register of lanes before it begins with the next.
     """
     if waves is None:
-        read_pieces(a, i, AHEAD + i, s, is_relative, slope, degree)
+        read_pieces(a, i, AHEAD + i, s, is_relative, slope, form)
     else:
         t, low = two_sum(a[T + i], s)
         a[AHEAD + i], a[AHEAD + STRIDE + i] = fresh_phase(t, low + a[T_LOW + i], waves)
 
 
 @packed
-def read_pieces(a, i, place, s, is_relative, slope, degree):
+def read_pieces(a, i, place, s, is_relative, slope, form):
     """Write a lane's laws after a flight into the rows from `place` on, from its coefficients."""
     before = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
     u = before + s
-    r, r1, r2, mean_rate = law_at(a, RADIUS_LAW + i, STRIDE, u, before, degree)
-    r3 = third_derivative(a, RADIUS_LAW + i, STRIDE, u, degree)
-    nu, nu1, nu2, _ = law_at(a, WIDTH_LAW + i, STRIDE, u, u, degree)
+    r, r1, r2, mean_rate = law_at(a, RADIUS_LAW + i, STRIDE, u, before, form)
+    r3 = third_derivative(a, RADIUS_LAW + i, STRIDE, u, form)
+    nu, nu1, nu2, _ = law_at(a, WIDTH_LAW + i, STRIDE, u, u, form)
     w, w_low, w1, w2 = width_of(nu, nu1, nu2, r, r1, r2, is_relative)
-    h, h1, h2, _ = law_at(a, DEPTH_LAW + i, STRIDE, u, u, degree)
+    h, h1, h2, _ = law_at(a, DEPTH_LAW + i, STRIDE, u, u, form)
     m, m1, m2 = 0.0, 0.0, 0.0
     if slope is None:
-        m, m1, m2, _ = law_at(a, SLOPE_LAW + i, STRIDE, u, u, degree)
+        m, m1, m2, _ = law_at(a, SLOPE_LAW + i, STRIDE, u, u, form)
     a[BEFORE + i], a[MEAN_RATE + i] = before, mean_rate
     write_laws(a, place, LawsAt(r, r1, r2, r3, w, w_low, w1, w2, h, h1, h2, m, m1, m2), slope)
 
 
 @packed
-def radius_since(a, i, s, waves, degree):
+def radius_since(a, i, s, waves, form):
     """Return the radius at a flight's begin, its increase since, and `known` of docs/lanes.md."""
     if waves is None:
         return a[R0 + i], s * a[MEAN_RATE + i], a[BEFORE + i] - a[BACK + i]
@@ -285,7 +285,7 @@ def radius_since(a, i, s, waves, degree):
     across = turn + more  # sin and, in `less`, cos - 1 of the turn
     even, odd = wave_parts(law, 1, sine, cosine)
     r, dr = law[0] + even, fma(odd, across, even * less)
-    if len(degree) == TWO_WAVES:
+    if len(form) == TWO_WAVES:
         even, odd = wave_parts(law, 2, *twice(sine, cosine))
         r, dr = r + even, fma(2.0 * across, fma(odd, 1.0 + less, -even * across), dr)
         return r, dr, LONGEST_TURN - 2.0 * turn
@@ -320,7 +320,7 @@ def set_piece(a, i, piece, laws):
         a[BACK + i] = -NEVER
     for row in range(4):
         # The lane has 0 where no piece has anything else.
-        n_coefficients = 1 if laws.scene.laws[row, KIND] == CONSTANT else laws.degree + 2
+        n_coefficients = 1 if laws.scene.laws[row, KIND] == CONSTANT else laws.form + 2
         for j in range(n_coefficients):
             a[LAWS + (row * N_COEFFICIENTS + j) * STRIDE + i] = laws.pieces.coefficients[piece, row, j]
 
@@ -342,9 +342,9 @@ def know_laws(a, i, early, laws):
     END is minus infinity where they are out of reach.
     """
     t, t_low = a[T + i], a[T_LOW + i]
-    if laws.degree % 2 == 0:
+    if not laws.is_waves:
         set_reference(a, i, t - early, t_low, laws)
-        if laws.degree == PARABOLA:
+        if laws.form == PARABOLA:
             read_pieces(a, i, R0 + i, 0.0, laws.scene.is_relative, None, SHORT)
         else:
             read_pieces(a, i, R0 + i, 0.0, laws.scene.is_relative, None, LONG)

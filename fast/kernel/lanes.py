@@ -141,12 +141,12 @@ def cube_of_arc(r0, r1, r2, r3):
 
 
 @packed
-def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
+def aim(a, i, is_stem, is_relative, waves, slope, form, limits):
     """Choose a lane's wall and guess the time, walls moving at their speed now; returns the time.
 
     SURE is positive only where the part of the flight before y = 0 is as chosen: docs/lanes.md.
     """
-    outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, degree)
+    outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, form)
     _, y, _, vy, wall, _, _ = outset
     depth, rise = abs(y), abs(vy)
     is_in_cap = 1.0 if wall < 1.5 else 0.0
@@ -331,14 +331,14 @@ def told_slope(hit, m, vx, vy, limits):
 
 
 @part
-def along_arc(a, i, s, outset, there, waves, degree, limits):
+def along_arc(a, i, s, outset, there, waves, form, limits):
     """Return f of the arc that was left, f', the summed sizes of the terms of half of f', and what is known.
 
     f is found by its increments since. The last number is the lesser of `known` and `told` of docs/lanes.md:
     positive where the radius is known at both ends of a hop, which hangs on r' no more than on what enters.
     """
     x, y, vx, vy, _, q, v2 = outset
-    r0, dr, known = radius_since(a, i, s, waves, degree)
+    r0, dr, known = radius_since(a, i, s, waves, form)
     f = fma(dr, fma(2.0, r0, dr), -s * fma(s, v2, 2.0 * q))
     rate = 2.0 * fma(there.r, there.r1, -fma(s, v2, q))
     sizes = fma(abs(x), abs(vx), fma(abs(y), abs(vy), fma(s, v2, there.r * limits.rate)))
@@ -423,7 +423,7 @@ def laws_at_hit(there, delta):
 
 
 @packed
-def land(a, i, table, waves, slope, degree, limits):
+def land(a, i, table, waves, slope, form, limits):
     """Correct a lane's time of flight once, and tell whether the step is then right; if so, take it.
 
     `table` tells whether it is a stem, whether captures are wanted, and whether the width is given as nu.
@@ -432,9 +432,9 @@ def land(a, i, table, waves, slope, degree, limits):
     bend = limits.bend
     outset, hit, s = outset_of(a, i), a[HIT + i], a[S + i]
     x, y, vx, vy, wall, _, v2 = outset
-    there = laws_in(a, AHEAD + i, waves, is_relative, slope, degree)
+    there = laws_in(a, AHEAD + i, waves, is_relative, slope, form)
     r = there.r
-    hop, arc_rate, sizes, known = along_arc(a, i, s, outset, there, waves, degree, limits)
+    hop, arc_rate, sizes, known = along_arc(a, i, s, outset, there, waves, form, limits)
     k_side = side_curvature(vy, slope, limits)
     end = place_after(s, x, y, vx, vy)
     x_s, x_low, y_s, y_low = end
@@ -528,21 +528,21 @@ def error_left(curvature, s, delta, waves):
 
 
 @packed
-def fly(a, n, scene, waves, slope, degree, limits):
+def fly(a, n, scene, waves, slope, form, limits):
     """Find the next collision of each lane, and take the step where it is shown right."""
     widest_registers()
     is_stem, is_relative = scene.table == STEM, scene.is_relative
     table = is_stem, scene.table == MUSHROOM, is_relative
     for i in range(n):
-        aim(a, i, is_stem, is_relative, waves, slope, degree, limits)
+        aim(a, i, is_stem, is_relative, waves, slope, form, limits)
     for i in range(n):
-        look_ahead(a, i, a[S + i], waves, is_relative, slope, degree)
+        look_ahead(a, i, a[S + i], waves, is_relative, slope, form)
     for i in range(n):
-        land(a, i, table, waves, slope, degree, limits)
+        land(a, i, table, waves, slope, form, limits)
 
 
 @packed
-def chord(a, n, scene, waves, slope, degree, limits):
+def chord(a, n, scene, waves, slope, form, limits):
     """Find the next arc hit of captured particles: the base is unfolded, |L| is constant.
 
     The chord keeps the distance |L| / v from the centre; while that exceeds w the mouth is out of reach.
@@ -551,20 +551,20 @@ def chord(a, n, scene, waves, slope, degree, limits):
     bend, k_w, size = limits.bend, limits.curvature, limits.size
     is_cap, is_relative = scene.table == CAP, scene.is_relative
     for i in range(n):
-        outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, degree)
+        outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, form)
         inverse = ONE / (outset.v2 - fma(now.r1, now.r1, now.r * now.r2))
         s = 2.0 * fma(now.r, now.r1, -outset.q) * inverse
         s = s * fma(cube_of_arc(now.r, now.r1, now.r2, now.r3) * s, inverse, 1.0)
         a[S + i] = a[S + i] if a[TRIES + i] > 0.0 else s
         a[SURE + i] = now.w
     for i in range(n):
-        look_ahead(a, i, a[S + i], waves, is_relative, slope, degree)
+        look_ahead(a, i, a[S + i], waves, is_relative, slope, form)
     for i in range(n):
         outset, spin = outset_of(a, i), a[SPIN + i]
         x, y, vx, vy, _, _, v2 = outset
         s = a[S + i]
-        there = laws_in(a, AHEAD + i, waves, is_relative, slope, degree)
-        f, rate, sizes, known = along_arc(a, i, s, outset, there, waves, degree, limits)
+        there = laws_in(a, AHEAD + i, waves, is_relative, slope, form)
+        f, rate, sizes, known = along_arc(a, i, s, outset, there, waves, form, limits)
         inverse = ONE / rate
         delta = -f * inverse
         error = error_left((bend + v2) * inverse, s, delta, waves)

@@ -18,8 +18,8 @@ from fast.kernel.lanes import (  # isort: skip
     side_curvature,
 )  # fmt: skip
 from fast.kernel.records import (  # isort: skip
-    ANSWER_LOST, COARSE, END, FAR, FATE, HIT, HORIZON, MARKED, MAX_CORRECTIONS, MOVED, ON_ARC,
-    ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, S, STEM, STOP, SURE, T, TRIES, T_LOW, WALL, load,
+    ANSWER_LOST, COARSE, END, FAR, FATE, HIT, MARKED, MAX_CORRECTIONS, MOVED, ON_ARC, ON_BASE,
+    ON_FLOOR, ON_LEFT, ON_RIGHT, R0, S, STEM, STOP, SURE, T, TRIES, T_LOW, WALL, is_hit, load,
     particle_at, particle_of, put_particle, write_state, write_step,
 )  # fmt: skip
 from fast.kernel.scalar_step import NEAR
@@ -29,9 +29,9 @@ FIRST = np.int64(0)  # the lane in use
 
 
 @packed
-def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
+def aim_alone(a, is_stem, is_relative, waves, slope, form, limits):
     """Choose the wall and guess the time, as `aim` does; returns the wall."""
-    outset, now = outset_of(a, FIRST), laws_in(a, R0 + FIRST, waves, is_relative, slope, degree)
+    outset, now = outset_of(a, FIRST), laws_in(a, R0 + FIRST, waves, is_relative, slope, form)
     _, y, _, vy, wall, _, _ = outset
     depth, rise = abs(y), abs(vy)
     k_side = side_curvature(vy, slope, limits)
@@ -66,18 +66,18 @@ def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
 
 
 @packed
-def land_on(a, hit, is_stem, is_relative, waves, slope, degree, limits):
+def land_on(a, hit, is_stem, is_relative, waves, slope, form, limits):
     """Take the step to a wall, if that is shown right; stays are of no interest."""
     a[HIT] = hit
-    land(a, FIRST, (is_stem, False, is_relative), waves, slope, degree, limits)
+    land(a, FIRST, (is_stem, False, is_relative), waves, slope, form, limits)
 
 
 @packed
-def fly_alone(a, is_stem, is_relative, waves, slope, degree, limits):
+def fly_alone(a, is_stem, is_relative, waves, slope, form, limits):
     """Find the next collision, and take the step where it is shown right, as `fly` does."""
-    scene = is_stem, is_relative, waves, slope, degree, limits
+    scene = is_stem, is_relative, waves, slope, form, limits
     hit = aim_alone(a, *scene)
-    look_ahead(a, FIRST, a[S], waves, is_relative, slope, degree)
+    look_ahead(a, FIRST, a[S], waves, is_relative, slope, form)
     if hit == ON_ARC:
         land_on(a, ON_ARC, *scene)
     elif hit == ON_BASE:
@@ -91,7 +91,7 @@ def fly_alone(a, is_stem, is_relative, waves, slope, degree, limits):
 
 
 @part
-def next_hit(a, worker, waves, slope, degree):
+def next_hit(a, worker, waves, slope, form):
     """Take the next step of the particle in the first lane; returns its wall, or what comes instead.
 
     The lanes' answer is taken unless the end may come before: there the scalar step looks from both sides.
@@ -100,7 +100,7 @@ def next_hit(a, worker, waves, slope, degree):
     a[STOP] = min(a[T] + limit * (1.0 - 4.0 * NEAR), worker.laws.pieces.until)
     is_stem, is_relative = worker.laws.scene.table == STEM, worker.laws.scene.is_relative
     while knows_laws(a, FIRST, worker):
-        fly_alone(a, is_stem, is_relative, waves, slope, degree, worker.laws.limits)
+        fly_alone(a, is_stem, is_relative, waves, slope, form, worker.laws.limits)
         if a[FATE] == MOVED or a[FATE] == MARKED:
             if a[T] >= a[END]:
                 set_reference(a, FIRST, a[T], a[T_LOW], worker.laws)
@@ -110,7 +110,7 @@ def next_hit(a, worker, waves, slope, degree):
         elif a[FATE] != COARSE:
             break
     code, s, p = careful_flight(a, FIRST, worker)
-    if code < HORIZON:
+    if is_hit(code):
         land_carefully(GENERAL, a, FIRST, code, s, p, worker)
     else:
         put_particle(a, FIRST, p)
@@ -118,7 +118,7 @@ def next_hit(a, worker, waves, slope, degree):
 
 
 def _path(is_slope_moving, form):
-    degree, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
+    form, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
 
     @kept(is_slope_moving, form, nogil=True, **HOW)
     def follow_path(worker, wall, factors, steps, walls):
@@ -134,8 +134,8 @@ def _path(is_slope_moving, form):
         load(a, FIRST, particle_at(states, 0, wall), False)
         code, n = wall, 0
         while n < steps.shape[0] and worker.stops.called_off[0] == 0:
-            code = next_hit(a, worker, waves, slope, degree)
-            if code >= HORIZON:
+            code = next_hit(a, worker, waves, slope, form)
+            if not is_hit(code):
                 break
             if not write_step(steps, n, factors, a[S], particle_of(a, FIRST)):
                 code = ANSWER_LOST

@@ -13,16 +13,35 @@ import numpy as np
 import numpy.typing as npt
 
 from fast.kernel.compiling import kernel, part
+from fast.kernel.fates import Fate
 
 NO_WALL, ARC, BASE, LEFT, RIGHT, FLOOR = np.arange(-1, 5)
 N_WALLS = 5
-HORIZON, SLIDING, MOUTH_EDGE, ON_CORNER = np.array([10, 20, 21, 22])
-FAR_TIME, TOO_MANY, TANGENT, CORNER, EDGE, START, AT_END, TOO_FAR = np.arange(31, 39)
-# A refused state moves into the wall that it leaves, or lies beyond a wall: BEYOND plus that wall's code; or
-# it is off the wall that it names. ANEW is no end: a particle that cannot go on from where it was kept, and
-# is to be followed from its start. A BAD_QUESTION is refused. ANSWER_LOST: a number of the answer does not
-# fit into binary64.
-APPROACHING, BEYOND, ANEW, OFF_WALL, BAD_QUESTION, ANSWER_LOST = np.array([40, 41, 50, 52, 53, 54])
+
+
+def code_of(fate: Fate) -> np.int64:
+    """Return a fate's code as kernels take it."""
+    return np.int64(fate.code)
+
+
+HORIZON = code_of(Fate.HORIZON)
+SLIDING = code_of(Fate.SLIDING)
+MOUTH_EDGE = code_of(Fate.MOUTH_EDGE)
+CORNER = code_of(Fate.CORNER)
+TOO_LATE = code_of(Fate.TOO_LATE)
+TOO_MANY_PARABOLAS = code_of(Fate.TOO_MANY_PARABOLAS)
+NEAR_TANGENCY = code_of(Fate.NEAR_TANGENCY)
+NEAR_CORNER = code_of(Fate.NEAR_CORNER)
+NEAR_MOUTH_EDGE = code_of(Fate.NEAR_MOUTH_EDGE)
+NEAR_START = code_of(Fate.NEAR_START)
+NEAR_HORIZON = code_of(Fate.NEAR_HORIZON)
+TOO_FAR = code_of(Fate.TOO_FAR)
+ANSWER_LOST = code_of(Fate.ANSWER_LOST)
+APPROACHING = code_of(Fate.APPROACHING)
+BEYOND_ARC = code_of(Fate.BEYOND_ARC)
+OFF_WALL = code_of(Fate.OFF_WALL)
+BAD_QUESTION = code_of(Fate.BAD_QUESTION)
+FOLLOW_ANEW = code_of(Fate.FOLLOW_ANEW)
 CAP, STEM, MUSHROOM = np.arange(3)
 
 
@@ -208,7 +227,9 @@ class LawsInLanes(NamedTuple):
         limits: what holds of its laws for all time.
         pieces: its laws as polynomials; of waves their period alone, and up to when they are known.
         waves: its laws as waves.
-        degree: of the polynomials, PARABOLA or SERIES of fast.kernel.lane_laws; or ONE_WAVE or TWO_WAVES.
+        form: ONE_WAVE, TWO_WAVES, PARABOLA or SERIES of fast.kernel.lane_laws; those of pieces are the
+            polynomials' degree.
+        is_waves: the form is one of waves.
         is_slope_moving: the slope of the sides moves.
         slope: what it is where it stands still.
     """
@@ -217,7 +238,8 @@ class LawsInLanes(NamedTuple):
     limits: LawLimits
     pieces: Pieces
     waves: LaneWaves
-    degree: int
+    form: int
+    is_waves: bool
     is_slope_moving: bool
     slope: float
 
@@ -323,6 +345,18 @@ def unfilled_ends(
         np.full((n, *slots), np.nan),
         np.full((n, n_lane_rows), np.nan),
     )
+
+
+@kernel
+def is_hit(code):
+    """Tell whether a step's code is that of a wall that is met, or NO_WALL."""
+    return code < HORIZON
+
+
+@kernel
+def is_lost(code):
+    """Tell whether a step's code is that of a particle that neither meets a wall nor reaches the horizon."""
+    return code > HORIZON
 
 
 @kernel

@@ -114,7 +114,7 @@ class Worker(NamedTuple):
 
     Attributes:
         laws: the scene, as the lanes know it.
-        loops: the compiled loops for laws of this degree and such a slope.
+        loops: the compiled loops for laws of this form and such a slope.
         anchors: room for its laws at one time.
         is_laned: the lanes may be used.
         pools: (2, POOL_SIZE) general and disk pool.
@@ -160,7 +160,7 @@ def new_worker(
     """Return a worker that holds no particle yet; with its scene's loops, or the given ones."""
     return Worker(
         in_lanes,
-        loops or loops_for(in_lanes.is_slope_moving, in_lanes.degree),
+        loops or loops_for(in_lanes.is_slope_moving, in_lanes.form),
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
         new_pools(),

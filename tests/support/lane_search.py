@@ -69,10 +69,10 @@ class Round(LaneRound):
     def call_loop(self, a: list[float], count: int) -> None:
         """Call the loop of the kernels that `follow.advance` calls."""
         of, k = self.in_lanes, self.kernels
-        waves = of.waves if of.degree in (k.ONE_WAVE, k.TWO_WAVES) else None
+        waves = of.waves if of.form in (k.ONE_WAVE, k.TWO_WAVES) else None
         step = k.chord if self.is_disk else k.fly
         slope = None if of.is_slope_moving else of.slope
-        step(a, count, of.scene, waves, slope, (0,) * of.degree, of.limits)
+        step(a, count, of.scene, waves, slope, (0,) * of.form, of.limits)
 
     def correct_lane(self, a: list[float], i: int) -> None:
         """Correct a step that is not yet right again, as the next rounds do."""
@@ -197,7 +197,7 @@ def try_starts(
         for i in np.flatnonzero(is_live):
             p, wall = begun[i]
             code, truth = pool.careful(p, wall)
-            if code == records.START:  # the careful step cannot tell whether it is inside its walls
+            if code == records.NEAR_START:  # the careful step cannot tell whether it is inside its walls
                 tally["starts at a corner"] += 1
                 is_live[i] = False
                 is_wrong = hits[i] != records.FLOOR and pool.is_floor_met_at_once(p)

@@ -23,21 +23,11 @@ from conformance.cases.delicate_families import sunk
 from conformance.strategies import scenes
 from fast import pieces
 from fast.ensemble import initial_states
-from fast.kernel import worker
+from fast.kernel import rows, worker
 from fast.kernel.compiling import HOW, TOOLS
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES, fresh_phase, law_at, law_of_waves, piece_at
 from fast.kernel.lanes import chord, fly
-from fast.kernel.records import (
-    DEPTH,
-    LANES,
-    MUSHROOM,
-    N_HARMONICS,
-    OMEGA,
-    POOL_SIZE,
-    SHARED,
-    Compiled,
-    LawLimits,
-)
+from fast.kernel.records import DEPTH, MUSHROOM, N_HARMONICS, OMEGA, SHARED, Compiled, LawLimits
 from fast.kernel.worker import CACHE_LINE, new_pools
 from fast.pieces import PARABOLA, SERIES, laws_in_lanes, waves_of
 from fast.step import WALL_CODES
@@ -76,9 +66,9 @@ def test_the_width_of_registers_changes_no_bit(step):
     limits, waves = LawLimits(*np.ones(8)), NO_WAVES._replace(omega=0.5, r=(1.0, 0.1, 0.2, 0.0, 0.0))
     table, pools, texts = Compiled(int(MUSHROOM), True, np.zeros((5, 5)), np.zeros((4, 4))), [], []
     for each in (step, FunctionType(step.__code__, less)):
-        pool = np.random.default_rng(1).uniform(0.5, 2.0, POOL_SIZE)
+        pool = np.random.default_rng(1).uniform(0.5, 2.0, rows.POOL_SIZE)
         compiled = njit(**HOW)(each)
-        compiled(pool, LANES, table, waves, 0.125, (0,), limits)
+        compiled(pool, rows.LANES, table, waves, 0.125, (0,), limits)
         pools.append(pool.tobytes())
         texts.append(compiled.inspect_asm(compiled.signatures[0]))
     assert pools[0] == pools[1]
@@ -156,7 +146,7 @@ def test_lanes_take_the_careful_steps(name, tally):
     """From collisions of paths on: the search of test_fast_lane_search.py, in scenes that people ask for."""
     scene, random = SCENES[name], np.random.default_rng(3)
     for t, _, *place in initial_states(scene, N_PATHS, 1e5, 3).tolist():
-        path = fast.trajectory(scene, State(t, *place), LANES)
+        path = fast.trajectory(scene, State(t, *place), rows.LANES)
         starts = [
             (np.array([t, 0.0, *place]), WALL_CODES[wall])
             for wall, (_, t, *place) in zip(path.walls, path.steps.tolist(), strict=True)
@@ -177,7 +167,7 @@ def test_pools_begin_with_a_cache_line_wherever_memory_lies():
         held.append(pools)
         assert pools.ctypes.data % CACHE_LINE == 0
         assert pools.flags.c_contiguous
-        assert pools.shape == (2, POOL_SIZE)
+        assert pools.shape == (2, rows.POOL_SIZE)
 
 
 ROUNDING = 8 * 2.0**-53

@@ -20,19 +20,17 @@ flight that ran out of its piece was given another in mid-flight.
 
 import numpy as np
 
+from fast.kernel import rows
 from fast.kernel.arithmetic import dot, fma
 from fast.kernel.compiling import HOW, kept, kernel, part
 from fast.kernel.lane_laws import know_laws, set_piece, set_reference
 from fast.kernel.lanes import count_hit, stay_after
 
 from fast.kernel.records import (  # isort: skip
-    ARC, AS_GIVEN, CAP, CAPTURED, CLEARLY, END, FAR, FATE, FOLLOW_ANEW, HORIZON, LANES, LATE,
-    LAWS, MARKED, MAX_CORRECTIONS, MOVED, MUSHROOM, NEVER, NOT_YET, N_ARC, N_BASE, N_FLOOR,
-    N_LEFT, N_RIGHT, N_ROWS, N_WALLS, ON_ARC, OVER, PIECE, POOL_SIZE, R1, RADIUS, REF, S, SINCE,
-    SPIN, STAY, STAY_IN, STAY_OUT, STOP, STRIDE, T, TOO_FAR, TRIES, T_LOW, UNTIL, VALUE, VX, VY,
-    W0_LOW, WALL, WHEN, WIDTH, X, Y, Particle, copy_rows, is_hit, is_lost, load, particle_at,
-    particle_of, put_particle, refold, whole_registers, write_state,
+    ARC, CAP, FOLLOW_ANEW, HORIZON, MUSHROOM, N_WALLS, RADIUS, TOO_FAR, VALUE, WIDTH, Particle,
+    is_hit, is_lost, particle_at, write_state,
 )  # fmt: skip
+from fast.kernel.rows import copy_rows, load, particle_of, put_particle, refold, whole_registers
 from fast.kernel.scalar_step import KNOWN
 from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE, run_careful, run_step
 
@@ -40,7 +38,7 @@ from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE, run_careful, 
 # the laws; then the rows of the pool up to W0_LOW.
 POOL, NEXT, CAREFUL, IS_KNOWN = np.arange(4)
 FIRST_ROW = 4
-LANE_ROWS = FIRST_ROW + int(W0_LOW // STRIDE)
+LANE_ROWS = FIRST_ROW + int(rows.W0_LOW // rows.STRIDE)
 
 
 @kernel
@@ -51,32 +49,32 @@ def keep_lane(pool, a, i, roster, is_known, worker):
     out[:] = 0.0
     out[POOL], out[NEXT], out[CAREFUL] = pool, roster[NEXT_STOP, i], followed.careful[j]
     out[IS_KNOWN] = 1.0 if is_known else 0.0
-    last = REF
+    last = rows.REF
     if is_known:
-        last = R1 + STRIDE if worker.laws.is_waves else W0_LOW
-    for k in range(last // STRIDE):
-        out[FIRST_ROW + k] = a[k * STRIDE + i]
+        last = rows.R1 + rows.STRIDE if worker.laws.is_waves else rows.W0_LOW
+    for k in range(last // rows.STRIDE):
+        out[FIRST_ROW + k] = a[k * rows.STRIDE + i]
 
 
 @kernel
 def take_lane(a, i, roster, j, worker):
     """Put a kept particle into a lane, before it is attended to."""
     kept = worker.followed.lanes[j]
-    for row in range(N_ROWS):
-        a[row * STRIDE + i] = 0.0
+    for row in range(rows.N_ROWS):
+        a[row * rows.STRIDE + i] = 0.0
     roster[PARTICLE, i], roster[NEXT_STOP, i] = j, int(kept[NEXT])
     worker.followed.careful[j] = int(kept[CAREFUL])
-    for k in range(W0_LOW // STRIDE):
-        a[k * STRIDE + i] = kept[FIRST_ROW + k]
-    a[STAY + i] = CAPTURED if a[STAY_OUT + i] == NEVER else OVER
-    if a[STAY_IN + i] == NEVER:
-        a[STAY + i] = NOT_YET
-    a[STOP + i], a[END + i] = -NEVER, -NEVER
+    for k in range(rows.W0_LOW // rows.STRIDE):
+        a[k * rows.STRIDE + i] = kept[FIRST_ROW + k]
+    a[rows.STAY + i] = rows.CAPTURED if a[rows.STAY_OUT + i] == rows.NEVER else rows.OVER
+    if a[rows.STAY_IN + i] == rows.NEVER:
+        a[rows.STAY + i] = rows.NOT_YET
+    a[rows.STOP + i], a[rows.END + i] = -rows.NEVER, -rows.NEVER
     if kept[IS_KNOWN] > 0.0:
         if worker.laws.is_waves:
-            a[END + i] = NEVER
+            a[rows.END + i] = rows.NEVER
         else:
-            set_piece(a, i, int(a[PIECE + i]), worker.laws)
+            set_piece(a, i, int(a[rows.PIECE + i]), worker.laws)
 
 
 STAYS, MOVES, ENDS = 0, 1, 2
@@ -101,14 +99,15 @@ def note_stops(a, i, roster, last, stops, followed):
     j, at = roster[PARTICLE, i], roster[NEXT_STOP, i]
     times = stops.times
     while at < times.shape[0] and times[at] <= last:
-        begin, end = a[STAY_IN + i], a[STAY_OUT + i]
+        begin, end = a[rows.STAY_IN + i], a[rows.STAY_OUT + i]
         column = stops.columns[at]
         if column >= 0:
-            followed.energies[j, column] = 0.5 * (a[VX + i] * a[VX + i] + a[VY + i] * a[VY + i])
-            followed.is_captured[j, column] = begin < NEVER and end == NEVER
-        elif begin == NEVER or a[UNTIL + i] < begin:
-            a[SINCE + i] = a[UNTIL + i] = times[at]
-        if stops.cycles[at] >= 0 and begin < NEVER:
+            vx, vy = a[rows.VX + i], a[rows.VY + i]
+            followed.energies[j, column] = 0.5 * (vx * vx + vy * vy)
+            followed.is_captured[j, column] = begin < rows.NEVER and end == rows.NEVER
+        elif begin == rows.NEVER or a[rows.UNTIL + i] < begin:
+            a[rows.SINCE + i] = a[rows.UNTIL + i] = times[at]
+        if stops.cycles[at] >= 0 and begin < rows.NEVER:
             keep_stay(j, stops.cycles[at], begin, min(end, times[at]), stops, followed)
         at += 1
     roster[NEXT_STOP, i] = at
@@ -117,21 +116,21 @@ def note_stops(a, i, roster, last, stops, followed):
 @part
 def note_stay(a, i, roster, stops, followed):
     """Bring a lane's capture interval up to date with its last hit, and record it where it is over."""
-    stay, t, begin = a[STAY + i], a[T + i], a[STAY_IN + i]
-    end = min(a[STAY_OUT + i], t)
-    if stay >= CAPTURED:
-        a[STAY + i], a[STAY_IN + i], a[STAY_OUT + i] = CAPTURED, min(begin, t), NEVER
-    elif stay == OVER:
-        a[STAY_OUT + i] = end
-    elif begin < NEVER:
-        if begin <= a[UNTIL + i] and a[SINCE + i] <= end:
+    stay, t, begin = a[rows.STAY + i], a[rows.T + i], a[rows.STAY_IN + i]
+    end = min(a[rows.STAY_OUT + i], t)
+    if stay >= rows.CAPTURED:
+        a[rows.STAY + i], a[rows.STAY_IN + i], a[rows.STAY_OUT + i] = rows.CAPTURED, min(begin, t), rows.NEVER
+    elif stay == rows.OVER:
+        a[rows.STAY_OUT + i] = end
+    elif begin < rows.NEVER:
+        if begin <= a[rows.UNTIL + i] and a[rows.SINCE + i] <= end:
             at = roster[NEXT_STOP, i]
             while stops.cycles[at] < 0:  # the last stop ends a cycle
                 at += 1
             keep_stay(roster[PARTICLE, i], stops.cycles[at], begin, end, stops, followed)
             if stops.is_first_kept:
-                a[UNTIL + i] = -NEVER  # no other is wanted
-        a[STAY_IN + i] = a[STAY_OUT + i] = NEVER
+                a[rows.UNTIL + i] = -rows.NEVER  # no other is wanted
+        a[rows.STAY_IN + i] = a[rows.STAY_OUT + i] = rows.NEVER
 
 
 @part
@@ -140,23 +139,23 @@ def finish(pool, a, i, j, code, end, followed):
 
     In the disk a particle is unfolded, whatever its spin: in a cap that may be 0.
     """
-    t, t_low, x, y, vx, vy = a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i]
+    t, t_low, x, y, vx, vy, wall = particle_of(a, i)
     if code == HORIZON:
         dt = (end - t) - t_low
         t, t_low = end, 0.0
         x, y_end = fma(vx, dt, x), fma(vy, dt, y)
-        if pool == DISK and a[WALL + i] == ON_ARC:  # the base may lie between
+        if pool == DISK and a[rows.WALL + i] == rows.ON_ARC:  # the base may lie between
             if y * y_end < 0.0:
-                a[N_BASE + i] += 1.0
+                a[rows.N_BASE + i] += 1.0
             if y_end < 0.0:
                 y_end, vy = -y_end, -vy
         y = y_end
-    write_state(followed.states, j, Particle(t, t_low, x, y, vx, vy, int(a[WALL + i])))
+    write_state(followed.states, j, Particle(t, t_low, x, y, vx, vy, wall))
     followed.codes[j] = code
     if code != HORIZON and followed.lanes.shape[1] > 0:
         followed.lanes[j] = np.nan  # nothing goes on from there
     for wall in range(N_WALLS):
-        followed.counts[j, wall] = int(a[N_ARC + wall * STRIDE + i])
+        followed.counts[j, wall] = int(a[rows.N_ARC + wall * rows.STRIDE + i])
 
 
 @kernel
@@ -172,7 +171,7 @@ def set_stop(a, i, since, roster, worker):
     """Tell a lane when `attend` is to look at it next: never later than a period after the time `since`."""
     times, at, pieces = worker.stops.times, roster[NEXT_STOP, i], worker.laws.pieces
     stop = min(since + pieces.period, pieces.until)
-    a[STOP + i] = min(stop, times[at]) if at < times.shape[0] else stop
+    a[rows.STOP + i] = min(stop, times[at]) if at < times.shape[0] else stop
 
 
 @kernel
@@ -187,18 +186,18 @@ def careful_flight(a, i, worker):
 def land_carefully(pool, a, i, code, s, p, worker):
     """Move a lane to the collision that a scalar step has found; the anchors hold the laws there."""
     scene, hit = worker.laws.scene, float(code)
-    if code != ARC or a[WALL + i] != ON_ARC:  # it has left the arc by now
-        a[AS_GIVEN + i] = 0.0
+    if code != ARC or a[rows.WALL + i] != rows.ON_ARC:  # it has left the arc by now
+        a[rows.AS_GIVEN + i] = 0.0
     if worker.laws.scene.table == MUSHROOM:
-        w, vx, vy = worker.anchors[WIDTH, VALUE], a[VX + i], a[VY + i]
+        w, vx, vy = worker.anchors[WIDTH, VALUE], a[rows.VX + i], a[rows.VY + i]
         if scene.is_relative:
             w *= worker.anchors[RADIUS, VALUE]
-        a[STAY + i] = stay_after(a[STAY + i], hit, p, (vx, vy, fma(vx, vx, vy * vy)), w)
+        a[rows.STAY + i] = stay_after(a[rows.STAY + i], hit, p, (vx, vy, fma(vx, vx, vy * vy)), w)
     if pool == DISK:
-        a[SPIN + i] = p.x * p.vy - p.y * p.vx
+        a[rows.SPIN + i] = p.x * p.vy - p.y * p.vx
     count_hit(a, i, hit)
     put_particle(a, i, p)
-    a[WALL + i], a[S + i], a[TRIES + i] = hit, s, 0.0
+    a[rows.WALL + i], a[rows.S + i], a[rows.TRIES + i] = hit, s, 0.0
     if worker.is_laned:
         know_laws(a, i, 0.0, worker.laws)
 
@@ -229,13 +228,16 @@ def step_carefully(pool, a, i, roster, worker):
 @part
 def collisions_of(a, i):
     """Return how many collisions a lane's particle has had."""
-    return a[N_ARC + i] + a[N_BASE + i] + a[N_LEFT + i] + a[N_RIGHT + i] + a[N_FLOOR + i]
+    total = 0.0
+    for wall in range(N_WALLS):
+        total += a[rows.N_ARC + wall * rows.STRIDE + i]
+    return total
 
 
 @part
 def knows_laws(a, i, worker):
     """Tell whether the lanes may take a particle's next step."""
-    return worker.is_laned and a[END + i] > -NEVER and a[AS_GIVEN + i] == 0.0
+    return worker.is_laned and a[rows.END + i] > -rows.NEVER and a[rows.AS_GIVEN + i] == 0.0
 
 
 @kernel
@@ -244,16 +246,16 @@ def mark(pool, a, i, since, roster, worker):
 
     Its flight was looked at up to the time `since`.
     """
-    is_clearly_captured = a[STAY + i] == CLEARLY
+    is_clearly_captured = a[rows.STAY + i] == rows.CLEARLY
     note_stay(a, i, roster, worker.stops, worker.followed)
-    if a[T + i] >= a[END + i] and a[END + i] > -NEVER:
-        set_reference(a, i, a[T + i], a[T_LOW + i], worker.laws)
+    if a[rows.T + i] >= a[rows.END + i] and a[rows.END + i] > -rows.NEVER:
+        set_reference(a, i, a[rows.T + i], a[rows.T_LOW + i], worker.laws)
     if knows_laws(a, i, worker):
         set_stop(a, i, since, roster, worker)
     else:
-        a[STOP + i] = -NEVER
+        a[rows.STOP + i] = -rows.NEVER
     if pool == GENERAL and is_clearly_captured and worker.is_laned:
-        a[SPIN + i] = dot(a[X + i], a[VY + i], -a[Y + i], a[VX + i])
+        a[rows.SPIN + i] = dot(a[rows.X + i], a[rows.VY + i], -a[rows.Y + i], a[rows.VX + i])
         return MOVES
     return STAYS
 
@@ -262,18 +264,18 @@ def mark(pool, a, i, since, roster, worker):
 def code_of_attention(pool, a, i, roster, worker):
     """Take a lane past stops, or a scalar step; returns the code of its end, or ARC for none."""
     stops, followed, end = worker.stops, worker.followed, worker.stops.times[-1]
-    is_late = knows_laws(a, i, worker) and a[FATE + i] == LATE
-    if followed.lanes.shape[1] > 0 and not (is_late and a[WHEN + i] < end):
+    is_late = knows_laws(a, i, worker) and a[rows.FATE + i] == rows.LATE
+    if followed.lanes.shape[1] > 0 and not (is_late and a[rows.WHEN + i] < end):
         # It may end here. A step that was refused is kept as one of unknown laws: tried again, from another
         # piece, it may be shown right, and then other bits would follow than in a run at once.
         keep_lane(pool, a, i, roster, is_late, worker)
     code = ARC
     if is_late:
-        note_stops(a, i, roster, a[WHEN + i], stops, followed)
+        note_stops(a, i, roster, a[rows.WHEN + i], stops, followed)
         if roster[NEXT_STOP, i] == stops.times.shape[0]:
             code = HORIZON
-        if not a[WHEN + i] < worker.laws.pieces.until:
-            a[END + i] = -NEVER
+        if not a[rows.WHEN + i] < worker.laws.pieces.until:
+            a[rows.END + i] = -rows.NEVER
     else:
         code = step_carefully(pool, a, i, roster, worker)
         code = ARC if is_hit(code) else code
@@ -294,25 +296,27 @@ def attend(pool, a, i, roster, worker):
 
     A particle with too many collisions is given up: energy may grow without end.
     """
-    fate, knows = a[FATE + i], knows_laws(a, i, worker)
-    if knows and fate == MARKED:
-        return mark(pool, a, i, a[T + i], roster, worker)
-    if knows and fate == FAR and a[TRIES + i] <= MAX_CORRECTIONS:  # the piece at the flight's end
-        t = a[T + i] + a[S + i]
-        set_reference(a, i, t, a[T_LOW + i], worker.laws)
-        if a[END + i] > -NEVER:
+    fate, knows = a[rows.FATE + i], knows_laws(a, i, worker)
+    if knows and fate == rows.MARKED:
+        return mark(pool, a, i, a[rows.T + i], roster, worker)
+    if (
+        knows and fate == rows.FAR and a[rows.TRIES + i] <= rows.MAX_CORRECTIONS
+    ):  # the piece at the flight's end
+        t = a[rows.T + i] + a[rows.S + i]
+        set_reference(a, i, t, a[rows.T_LOW + i], worker.laws)
+        if a[rows.END + i] > -rows.NEVER:
             return STAYS
-    if pool == DISK and worker.laws.scene.table == MUSHROOM and not (knows and fate == LATE):
+    if pool == DISK and worker.laws.scene.table == MUSHROOM and not (knows and fate == rows.LATE):
         refold(a, i)
-        a[WALL + i], a[TRIES + i] = ON_ARC, 0.0
+        a[rows.WALL + i], a[rows.TRIES + i] = rows.ON_ARC, 0.0
         return MOVES
     # A flight that takes longer than a period was looked at up to its end; else it would be again and again.
-    flown = a[WHEN + i] if knows and fate == LATE else -NEVER
+    flown = a[rows.WHEN + i] if knows and fate == rows.LATE else -rows.NEVER
     code = code_of_attention(pool, a, i, roster, worker)
     if code != ARC:
         finish(pool, a, i, roster[PARTICLE, i], code, worker.stops.times[-1], worker.followed)
         return ENDS
-    return mark(pool, a, i, max(flown, a[T + i]), roster, worker)
+    return mark(pool, a, i, max(flown, a[rows.T + i]), roster, worker)
 
 
 @part
@@ -320,15 +324,15 @@ def last_to_attend(a, n):
     """Return the last of n lanes that needs attention, -1 for none, as is mostly so; one packed loop."""
     last = np.int64(-1)
     for i in range(n):
-        last = max(last, np.int64(i) if a[FATE + i] < MOVED else np.int64(-1))
+        last = max(last, np.int64(i) if a[rows.FATE + i] < rows.MOVED else np.int64(-1))
     return last
 
 
 @part
 def change_place(worker, pool, i, other, j):
     """Copy a lane and its entry in the roster to another place; without coefficients where laws are waves."""
-    last = LAWS if worker.laws.is_waves else POOL_SIZE
-    copy_rows(worker.pools[pool], i, worker.pools[other], j, T, last)
+    last = rows.LAWS if worker.laws.is_waves else rows.POOL_SIZE
+    copy_rows(worker.pools[pool], i, worker.pools[other], j, rows.T, last)
     worker.rosters[other, PARTICLE, j] = worker.rosters[pool, PARTICLE, i]
     worker.rosters[other, NEXT_STOP, j] = worker.rosters[pool, NEXT_STOP, i]
 
@@ -341,7 +345,7 @@ def scan(pool, worker):
     while i >= 0:
         fate = attend(pool, a, i, roster, worker)
         if fate == MOVES:
-            a[FATE + i] = MOVED  # of a flight in the other pool nothing is known yet
+            a[rows.FATE + i] = rows.MOVED  # of a flight in the other pool nothing is known yet
             change_place(worker, pool, i, other, n_held[other])
             n_held[other] += 1
         if fate != STAYS:
@@ -380,7 +384,7 @@ def follow_particles(worker, walls):
     pools, n_held = worker.pools, worker.n_held
     first, last = 0, worker.followed.states.shape[0]
     while worker.stops.called_off[0] == 0:
-        while n_held[GENERAL] + n_held[DISK] < LANES and first < last:
+        while n_held[GENERAL] + n_held[DISK] < rows.LANES and first < last:
             take_in(worker, first, walls[first])
             first += 1
         if n_held[GENERAL] + n_held[DISK] == 0:

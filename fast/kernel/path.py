@@ -17,11 +17,9 @@ from fast.kernel.lanes import (  # isort: skip
     ONE, arc_quotient, cube_of_arc, land, mouth_crossing, nearest_below, outset_of, side_bend,
     side_curvature,
 )  # fmt: skip
-from fast.kernel.records import (  # isort: skip
-    ANSWER_LOST, COARSE, END, FAR, FATE, HIT, MARKED, MAX_CORRECTIONS, MOVED, ON_ARC, ON_BASE,
-    ON_FLOOR, ON_LEFT, ON_RIGHT, R0, S, STEM, STOP, SURE, T, TRIES, T_LOW, WALL, is_hit, load,
-    particle_at, particle_of, put_particle, write_state, write_step,
-)  # fmt: skip
+from fast.kernel import rows
+from fast.kernel.records import ANSWER_LOST, STEM, is_hit, particle_at, write_state, write_step
+from fast.kernel.rows import load, particle_of, put_particle
 from fast.kernel.scalar_step import NEAR
 from fast.kernel.worker import FORMS, GENERAL
 
@@ -31,44 +29,44 @@ FIRST = np.int64(0)  # the lane in use
 @packed
 def aim_alone(a, is_stem, is_relative, waves, slope, form, limits):
     """Choose the wall and guess the time, as `aim` does; returns the wall."""
-    outset, now = outset_of(a, FIRST), laws_in(a, R0 + FIRST, waves, is_relative, slope, form)
+    outset, now = outset_of(a, FIRST), laws_in(a, rows.R0 + FIRST, waves, is_relative, slope, form)
     _, y, _, vy, wall, _, _ = outset
     depth, rise = abs(y), abs(vy)
     k_side = side_curvature(vy, slope, limits)
     sure, root = 1.0, 1.0
-    if wall <= ON_BASE and not is_stem:
+    if wall <= rows.ON_BASE and not is_stem:
         f, d, root = arc_quotient(outset, now.r, now.r1, now.r2)
-        hit = ON_ARC
+        hit = rows.ON_ARC
         if vy < 0.0 and not fma(y, d, vy * f) > 0.0:
             gap, doubt = mouth_crossing(outset, now.w, now.w1, k_side, limits)
             sure, root = abs(gap * rise) - doubt, 1.0
-            f, d, hit = nearest_below(outset, now, slope) if gap > 0.0 else (depth, rise, ON_BASE)
+            f, d, hit = nearest_below(outset, now, slope) if gap > 0.0 else (depth, rise, rows.ON_BASE)
     else:
         f, d, hit = nearest_below(outset, now, slope)
         is_crossing = vy > 0.0 and not fma(depth, d, -f * vy) > 0.0
         if is_crossing and is_stem:
-            f, d, hit = depth, rise, ON_BASE
+            f, d, hit = depth, rise, rows.ON_BASE
         elif is_crossing:
             gap, doubt = mouth_crossing(outset, now.w, now.w1, k_side + limits.lift, limits)
             f, d, root = arc_quotient(outset, now.r, now.r1, now.r2)
-            sure, hit = gap * rise - doubt, ON_ARC
+            sure, hit = gap * rise - doubt, rows.ON_ARC
     inverse = ONE / (d * root)
     s, beyond = f * (root * inverse), 0.0
-    if hit == ON_ARC:
+    if hit == rows.ON_ARC:
         beyond = cube_of_arc(now.r, now.r1, now.r2, now.r3) * s * s * d
-    elif hit == ON_FLOOR:
+    elif hit == rows.ON_FLOOR:
         beyond = now.h2 * s
-    elif hit != ON_BASE:
+    elif hit != rows.ON_BASE:
         beyond = side_bend(y, vy, now, slope) * s
-    a[S] = a[S] if a[TRIES] > 0.0 else s * fma(0.5 * beyond, inverse, 1.0)
-    a[SURE] = sure
+    a[rows.S] = a[rows.S] if a[rows.TRIES] > 0.0 else s * fma(0.5 * beyond, inverse, 1.0)
+    a[rows.SURE] = sure
     return hit
 
 
 @packed
 def land_on(a, hit, is_stem, is_relative, waves, slope, form, limits):
     """Take the step to a wall, if that is shown right; stays are of no interest."""
-    a[HIT] = hit
+    a[rows.HIT] = hit
     land(a, FIRST, (is_stem, False, is_relative), waves, slope, form, limits)
 
 
@@ -77,17 +75,17 @@ def fly_alone(a, is_stem, is_relative, waves, slope, form, limits):
     """Find the next collision, and take the step where it is shown right, as `fly` does."""
     scene = is_stem, is_relative, waves, slope, form, limits
     hit = aim_alone(a, *scene)
-    look_ahead(a, FIRST, a[S], waves, is_relative, slope, form)
-    if hit == ON_ARC:
-        land_on(a, ON_ARC, *scene)
-    elif hit == ON_BASE:
-        land_on(a, ON_BASE, *scene)
-    elif hit == ON_LEFT:
-        land_on(a, ON_LEFT, *scene)
-    elif hit == ON_RIGHT:
-        land_on(a, ON_RIGHT, *scene)
+    look_ahead(a, FIRST, a[rows.S], waves, is_relative, slope, form)
+    if hit == rows.ON_ARC:
+        land_on(a, rows.ON_ARC, *scene)
+    elif hit == rows.ON_BASE:
+        land_on(a, rows.ON_BASE, *scene)
+    elif hit == rows.ON_LEFT:
+        land_on(a, rows.ON_LEFT, *scene)
+    elif hit == rows.ON_RIGHT:
+        land_on(a, rows.ON_RIGHT, *scene)
     else:
-        land_on(a, ON_FLOOR, *scene)
+        land_on(a, rows.ON_FLOOR, *scene)
 
 
 @part
@@ -96,18 +94,18 @@ def next_hit(a, worker, waves, slope, form):
 
     The lanes' answer is taken unless the end may come before: there the scalar step looks from both sides.
     """
-    limit = (worker.stops.times[-1] - a[T]) - a[T_LOW]
-    a[STOP] = min(a[T] + limit * (1.0 - 4.0 * NEAR), worker.laws.pieces.until)
+    limit = (worker.stops.times[-1] - a[rows.T]) - a[rows.T_LOW]
+    a[rows.STOP] = min(a[rows.T] + limit * (1.0 - 4.0 * NEAR), worker.laws.pieces.until)
     is_stem, is_relative = worker.laws.scene.table == STEM, worker.laws.scene.is_relative
     while knows_laws(a, FIRST, worker):
         fly_alone(a, is_stem, is_relative, waves, slope, form, worker.laws.limits)
-        if a[FATE] == MOVED or a[FATE] == MARKED:
-            if a[T] >= a[END]:
-                set_reference(a, FIRST, a[T], a[T_LOW], worker.laws)
-            return int(a[WALL])
-        if a[FATE] == FAR and a[TRIES] <= MAX_CORRECTIONS:
-            set_reference(a, FIRST, a[T] + a[S], a[T_LOW], worker.laws)
-        elif a[FATE] != COARSE:
+        if a[rows.FATE] == rows.MOVED or a[rows.FATE] == rows.MARKED:
+            if a[rows.T] >= a[rows.END]:
+                set_reference(a, FIRST, a[rows.T], a[rows.T_LOW], worker.laws)
+            return int(a[rows.WALL])
+        if a[rows.FATE] == rows.FAR and a[rows.TRIES] <= rows.MAX_CORRECTIONS:
+            set_reference(a, FIRST, a[rows.T] + a[rows.S], a[rows.T_LOW], worker.laws)
+        elif a[rows.FATE] != rows.COARSE:
             break
     code, s, p = careful_flight(a, FIRST, worker)
     if is_hit(code):
@@ -137,7 +135,7 @@ def _path(is_slope_moving, form):
             code = next_hit(a, worker, waves, slope, form)
             if not is_hit(code):
                 break
-            if not write_step(steps, n, factors, a[S], particle_of(a, FIRST)):
+            if not write_step(steps, n, factors, a[rows.S], particle_of(a, FIRST)):
                 code = ANSWER_LOST
                 break
             walls[n] = code

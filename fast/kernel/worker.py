@@ -22,13 +22,14 @@ import numpy as np
 from numba import config, typeof, types
 from numba.core.typing import Signature, signature as returns
 
+from fast.kernel import rows
 from fast.kernel.compiling import HOW, caller, kept, widest_registers
 from fast.kernel.lane_laws import DEGREES, NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, LANES, POOL_SIZE, Compiled, FloatArray, Followed, IntArray, LawLimits, LawsInLanes,
-    Particle, Stops,
+    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawLimits, LawsInLanes, Particle,
+    Stops,
 )  # fmt: skip
 
 from fast.kernel.scalar_step import scalar_step
@@ -149,9 +150,9 @@ def new_pools() -> FloatArray:
     numpy begins at any multiple of 16 bytes, and a register that is loaded across two lines takes longer: how
     quick the same loops were hung on where a process happened to put them.
     """
-    room = np.zeros(2 * POOL_SIZE + CACHE_LINE // 8)
+    room = np.zeros(2 * rows.POOL_SIZE + CACHE_LINE // 8)
     first = -room.ctypes.data % CACHE_LINE // 8
-    return room[first : first + 2 * POOL_SIZE].reshape(2, POOL_SIZE)
+    return room[first : first + 2 * rows.POOL_SIZE].reshape(2, rows.POOL_SIZE)
 
 
 def new_worker(
@@ -164,7 +165,7 @@ def new_worker(
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
         new_pools(),
-        np.zeros((2, 2, LANES), np.int64),
+        np.zeros((2, 2, rows.LANES), np.int64),
         np.zeros(2, np.int64),
         stops,
         followed,

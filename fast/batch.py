@@ -28,8 +28,9 @@ from fast.kernel.walls import wall_residual
 from fast.kernel.worker import DISK, GENERAL, careful_at, new_worker, run_careful
 from fast.paths import FineTrajectory, as_trajectory, fill_fine_path
 from fast.pieces import laws_in_lanes
+from fast.prepared import prepare
 from fast.step import WALL_NAMES, as_arrays, end_of_path, fitted_start
-from fast.units import compile_scene, fit, outward
+from fast.units import compile_scene, outward
 from scene import Collision, Outcome, Scene, State
 
 PLACE = (rows.X, rows.Y, rows.VX, rows.VY)
@@ -115,9 +116,10 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
     Returns:
         The outcomes, and the seconds that n_times N steps took.
     """
-    starts = [fitted_start(scene, state) for state in states]
+    prepared = prepare(scene)
+    starts = [fitted_start(prepared, state) for state in states]
     rows, walls = as_arrays([particle for particle, _ in starts])
-    compiled = fit(scene).compiled
+    compiled = prepared.compiled
     take_careful_steps(compiled, rows[:0], walls[:0])  # compiles, or loads from the cache
     begin = time.perf_counter()
     codes, times, ends = take_careful_steps(compiled, rows, walls, n_times)
@@ -135,9 +137,11 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
 
 def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple[list[FineTrajectory], float]:
     """Take a fine step from each of N states, a call of compiled code for each; as `careful_steps`."""
-    starts = [fitted_start(scene, state) for state in states]
+    prepared = prepare(scene)
+    starts = [fitted_start(prepared, state) for state in states]
     steps, met = np.empty((len(states), 1, 6, 2)), np.empty((len(states), 1), dtype=np.int64)
-    compiled, particles = fit(scene).compiled, [particle for particle, _ in starts]
+    compiled = prepared.compiled
+    particles = [particle for particle, _ in starts]
     questions = [(compiled, *question) for question in zip(particles, steps, met, strict=True)]
     ends = [fill_fine_path(*question) for question in questions[:1]]  # compiles, or loads
     begin = time.perf_counter()
@@ -159,7 +163,7 @@ class LaneRound:
     def __init__(self, scene: Scene) -> None:
         self.compiled = compile_scene(scene)
         self.is_disk = bool(self.compiled.table == records.CAP)
-        self.in_lanes = laws_in_lanes(scene)
+        self.in_lanes = laws_in_lanes(scene, self.compiled)
         self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6))))
         self.anchors = np.zeros(ANCHORS_SHAPE)
         self.pool, self.spare = np.zeros(rows.POOL_SIZE), np.zeros(rows.POOL_SIZE)
@@ -204,11 +208,13 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
         or a flight to it (there the lanes go unfolded), and for a start that is on no wall, or on its wall
         by definition only: lanes know a particle by the wall that it has just met, and where that wall is.
     """
-    pool = LaneRound(fit(scene).scene)
+    prepared = prepare(scene)
+    pool = LaneRound(prepared.scene)
     found: list[Outcome | None] = []
     for first in range(0, len(states), rows.LANES):
         part = states[first : first + rows.LANES]
-        starts, are_met = [fitted_start(scene, state) for state in part], []
+        starts = [fitted_start(prepared, state) for state in part]
+        are_met = []
         for i, (p, wall) in enumerate(zip(*as_arrays([particle for particle, _ in starts]), strict=True)):
             pool.fill(i, p, wall)
             are_met.append(pool.is_met(p, wall))

@@ -11,7 +11,8 @@ from fast.kernel import records, single
 from fast.kernel.fates import FATES, Fate
 from fast.kernel.records import FloatArray, IntArray, Particle
 from fast.kernel.worker import careful_at
-from fast.units import LateTime, Units, fit
+from fast.prepared import Prepared, prepare
+from fast.units import LateTime, Units
 from scene import (
     BadInput,
     Collision,
@@ -62,11 +63,12 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
     try:
         if not is_plain(scene, state, t_end):
             state, t_end = check_numbers(scene, state, t_end), float(t_end)
+        prepared = prepare(scene)
         t, x, y, vx, vy, wall = state.t, state.x, state.y, state.vx, state.vy, WALL_CODES[state.wall]
-        ask, numbers = single.single_at_once(), fit(scene).packed
-        code, dt, t, x, y, vx, vy = ask(careful_at(), numbers, t, x, y, vx, vy, wall, t_end)
+        ask = single.single_at_once()
+        code, dt, t, x, y, vx, vy = ask(careful_at(), prepared.packed, t, x, y, vx, vy, wall, t_end)
         if code == records.BAD_QUESTION:  # by checks in compiled code: those that follow say why
-            start_at(scene, state, t_end)[1].horizon(t_end)
+            start_at(prepared, state, t_end)[1].horizon(t_end)
     except LateTime as error:
         return Undecided(str(error))
     except BadInput as error:
@@ -86,23 +88,22 @@ def is_plain(scene: Scene, state: State, t_end: float) -> bool:
     )
 
 
-def start_at(scene: Scene, state: State, t_end: float = sys.float_info.max) -> tuple[Particle, Units]:
+def start_at(prepared: Prepared, state: State, t_end: float = sys.float_info.max) -> tuple[Particle, Units]:
     """Return a state in the kernel's units; refuse what this stepper cannot hold, naming field and bound."""
-    return fitted_start(scene, check_numbers(scene, state, t_end))
+    return fitted_start(prepared, check_numbers(prepared.given, state, t_end))
 
 
-def fitted_start(scene: Scene, state: State) -> tuple[Particle, Units]:
+def fitted_start(prepared: Prepared, state: State) -> tuple[Particle, Units]:
     """Return a state that has been checked, in the kernel's units, and these.
 
     Raises:
         BadInput: scene or state do not fit, or the state is not on the wall that it names.
     """
-    fitted = fit(scene)
-    units = fitted.units(state)
+    units = prepared.units(state)
     t, x, y, vx, vy = units.numbers(state)
     particle = Particle(t, 0.0, x, y, vx, vy, WALL_CODES[state.wall])
     if state.wall is not None:
-        share = single.off_wall(careful_at(), fitted.compiled, particle)
+        share = single.off_wall(careful_at(), prepared.compiled, particle)
         if share:
             away = f"{share:.3g} of that wall's size"
             raise InvalidState(f"state.wall = {state.wall!r}, but the state is {away} away from that wall")

@@ -15,11 +15,11 @@ from support.depth import deep_among, deep_but
 import fast
 import theory
 from fast import ensemble
-from fast.ensemble import initial_states, one_cycle
+from fast.ensemble import initial_states
 from scene import BadInput, BangBang, Fourier, Mushroom, State, load
 from scene.geometry import table_at
 from scene.laws import value
-from scene.mouth import mouth_minima, start_time
+from scene.mouth import mouth_minima, one_cycle, start_time
 from scene.tables import width_factors
 
 

@@ -30,7 +30,7 @@ from fast import pieces, step as stepper, units
 from fast.batch import lane_steps
 from fast.kernel import arithmetic, records
 from fast.kernel.records import BAD_QUESTION
-from fast.units import fit
+from fast.prepared import prepare
 from scene import (
     BadInput,
     BangBang,
@@ -257,7 +257,7 @@ Question = tuple[Scene, State, float]
 def by_a_path(scene: Scene, state: State, t_end: float) -> Outcome | None:
     """Answer as `next_collision`, with checks in Python and the careful step of trajectories."""
     try:
-        fit(scene)
+        prepare(scene)
         check_numbers(scene, state, t_end)
         path = fast.trajectory(scene, state, 1, t_end)
     except BadInput as error:

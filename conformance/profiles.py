@@ -7,10 +7,10 @@ distribution the mean of n is off to either side, except with probability d, by 
                                                       empirical Bernstein, Maurer and Pontil 2009, theorem 4
 and so by the smaller of both at d / 2. The first is better for few particles, the second for many.
 
-`alarm`, 1e-6 for a whole run, is split over its tests. Particles that the implementation lost may have any
-value in [0, B], so their share of B is added to the margin. Each test names an `alternative`, the mean that
-a likely fault would give. If the margin reaches it, the test cannot detect the fault, and `has_power` is
-false.
+`alarm`, 1e-6 for a whole run, is split over its tests. Particles that are undecided or lost may have any
+value in [0, B], so their share of B is added to the margin. A particle is lost if its outcome is neither
+`horizon` nor `undecided`. Each test names an `alternative`, the mean that a likely fault would give. If the
+margin reaches it, the test cannot detect the fault, and `has_power` is false.
 
 Work identity. A flow keeps phase-space volume, so for every motion of the walls
     mean exp(-W / kT) = A(t) / A(0)     for canonical starts at kT, W = E1 - E0, A the area of the table.
@@ -36,17 +36,17 @@ directions are alike.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import log, pi, prod, sqrt
+from math import isnan, log, nan, pi, prod, sqrt
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from scene import BadInput, Horizon, Mushroom, Scene, State
+from scene import BadInput, Horizon, Mushroom, Outcome, Scene, State, Undecided
 from scene.geometry import area, half_width, table_at
 from scene.laws import size_bounds, values
-from scene.protocol.wire import Flowing
+from scene.protocol.wire import Captured, Flowing
 from scene.tables import laws
 from scene.transforms import backwards
 
@@ -56,7 +56,11 @@ MAX_LOST = 0.01  # of the particles: if more are lost, the rest shows nothing
 
 
 class Statistic(NamedTuple):
-    """One test: measured mean, expected mean, margin, and the alternative to be detected."""
+    """One test: measured mean, expected mean, margin, and the alternative to be detected.
+
+    Attributes:
+        n: particles in all, of which `lost` were lost and `undecided` left undecided.
+    """
 
     name: str
     measured: float
@@ -65,11 +69,14 @@ class Statistic(NamedTuple):
     n: int
     lost: int
     alternative: float
+    undecided: int = 0
 
     @property
     def is_met(self) -> bool:
-        """Tell whether the mean is within its margin."""
-        return bool(abs(self.measured - self.expected) <= self.margin)  # never with nan
+        """Tell whether the mean is within its margin; nan is, if nothing arrived that was decided."""
+        if isnan(self.measured) and self.undecided:
+            return True
+        return bool(abs(self.measured - self.expected) <= self.margin)
 
     @property
     def has_power(self) -> bool:
@@ -83,9 +90,10 @@ class Statistic(NamedTuple):
 
     def __str__(self) -> str:
         """Return one line of text."""
+        undecided = f", {self.undecided} undecided" if self.undecided else ""
         return (
             f"{self.name}: {self.measured:.5f}, must be {self.expected:.5f} within {self.margin:.5f}"
-            f" ({self.n} particles, {self.lost} lost)"
+            f" ({self.n} particles, {self.lost} lost{undecided})"
         )
 
 
@@ -140,6 +148,7 @@ def work_identity(
                 expected,
                 bound=1 / ratio,
                 n=n_particles,
+                undecided=_n_undecided(arrived),
                 alarm=alarm / len(times),
                 alternative=1.0,  # walls that do no work
             )
@@ -175,10 +184,20 @@ def captured_share(
     """
     narrowest = _span(scene, alarm) * least_nu(scene, scene.period)
     states = microcanonical_states(scene, n_particles, energy, _generator(seed, 0))
-    arrived = [o for o, _ in flow(scene, states, narrowest) if isinstance(o, Horizon)]
+    ends = flow(scene, states, narrowest)
+    arrived = [o for o, _ in ends if isinstance(o, Horizon)]
     free = np.array([not _is_captured(scene, o) for o in arrived], dtype=float)
     nobody = 1.0 if p_nc > 0.5 else 0.0  # is captured, or everybody
-    found = _statistic("p_nc", free, p_nc, bound=1.0, n=n_particles, alarm=alarm, alternative=nobody)
+    found = _statistic(
+        "p_nc",
+        free,
+        p_nc,
+        bound=1.0,
+        n=n_particles,
+        undecided=_n_undecided(ends),
+        alarm=alarm,
+        alternative=nobody,
+    )
     return found._replace(margin=found.margin + bias)
 
 
@@ -211,14 +230,22 @@ def mean_growth(
         BadInput: as for `captured_share`.
     """
     states = microcanonical_states(scene, n_particles, energy, _generator(seed, 1))
-    ended = [o for o, _ in flow(scene, states, _span(scene, alarm)) if isinstance(o, Horizon)]
+    ends = flow(scene, states, _span(scene, alarm))
+    ended = [o for o, _ in ends if isinstance(o, Horizon)]
     widest = largest + bias
     with np.errstate(divide="ignore"):  # a particle that lost all its energy is cut, as all are
         change = np.log([_energy(o) / energy for o in ended])
     s = np.clip(change, -widest, widest) + widest
     found = _statistic(
-        "m1", s, m1 + widest, bound=2 * widest, n=n_particles, alarm=alarm, alternative=widest
-    )  # energy that does not grow
+        "m1",
+        s,
+        m1 + widest,
+        bound=2 * widest,
+        n=n_particles,
+        undecided=_n_undecided(ends),
+        alarm=alarm,
+        alternative=widest,  # energy that does not grow
+    )
     return found._replace(
         measured=found.measured - widest, expected=m1, margin=found.margin + bias, alternative=0.0
     )
@@ -241,6 +268,7 @@ def reversal(
         BadInput: as for `captured_share`.
     """
     span = _span(scene, alarm)
+    is_open = np.zeros(n_particles, bool)
     energies = np.empty((2, n_particles, 2))  # of the cycle and of its reverse; at the start and at the end
     for i, cycle in enumerate((scene, backwards(scene))):
         random = _generator(seed, 2 + i)
@@ -248,13 +276,23 @@ def reversal(
         states = microcanonical_states(cycle, n_particles, energies[i, :, 0], random)
         ends = flow(cycle, states, span)
         energies[i, :, 1] = [_energy(o) if isinstance(o, Horizon) else np.nan for o, _ in ends]
+        is_open |= [isinstance(o, Undecided) for o, _ in ends]
     energies = energies[:, np.isfinite(energies).all(axis=(0, 2))]
     gain, end = energies[..., 1] - energies[..., 0], energies[..., 1]
     stays = (energy < end) & (end < 4 * energy)
     raised, lowered = (stays & (gain > 0)).astype(float), (stays & (gain < 0)).astype(float)
-    alike = float(1 + raised[0].mean() - lowered[0].mean()) / 2
+    alike = float(1 + raised[0].mean() - lowered[0].mean()) / 2 if energies.size else 0.5
     x = (1 + raised[0] - lowered[1]) / 2
-    return _statistic("reversal", x, 0.5, bound=1.0, n=n_particles, alarm=alarm, alternative=alike)
+    return _statistic(
+        "reversal",
+        x,
+        0.5,
+        bound=1.0,
+        n=n_particles,
+        undecided=int(is_open.sum()),
+        alarm=alarm,
+        alternative=alike,
+    )
 
 
 def _span(scene: Scene, alarm: float) -> float:
@@ -266,8 +304,15 @@ def _span(scene: Scene, alarm: float) -> float:
 
 
 def check_work_identity(flow: Flowing, scene: Scene, *, n_particles: int, kT: float, seed: int = 0) -> None:
-    """Raise AssertionError, with one line, if `work_identity` fails or too many particles are lost."""
-    require(work_identity(flow, scene, n_particles=n_particles, kT=kT, seed=seed))
+    """Raise AssertionError, with one line, if `work_identity` fails or shows nothing.
+
+    It shows nothing if too many particles are lost, or so many are undecided that anything would do.
+    """
+    findings = work_identity(flow, scene, n_particles=n_particles, kT=kT, seed=seed)
+    require(findings)
+    for finding in findings:
+        if finding.undecided and not finding.has_power:
+            raise AssertionError(f"{finding}: so many are undecided that anything would do")
 
 
 def require(findings: Sequence[Statistic]) -> None:
@@ -348,14 +393,26 @@ def _generator(seed: int, stream: int) -> np.random.Generator:
     return np.random.Generator(np.random.Philox(key=seed, counter=[0, 0, 0, stream]))
 
 
+def _n_undecided(ends: Sequence[tuple[Outcome, Captured]]) -> int:
+    return sum(isinstance(outcome, Undecided) for outcome, _ in ends)
+
+
 def _statistic(
-    name: str, x: Floats, expected: float, *, bound: float, n: int, alarm: float, alternative: float
+    name: str,
+    x: Floats,
+    expected: float,
+    *,
+    bound: float,
+    n: int,
+    undecided: int,
+    alarm: float,
+    alternative: float,
 ) -> Statistic:
+    lost = n - len(x) - undecided
     if len(x) < 2:
-        return Statistic(name, float("nan"), expected, 0.0, n, n - len(x), alternative)
-    lost = n - len(x)
-    allowed = margin(len(x), float(np.var(x, ddof=1)), bound, alarm) + bound * lost / n
-    return Statistic(name, float(x.mean()), expected, allowed, n, lost, alternative)
+        return Statistic(name, nan, expected, bound if undecided else 0.0, n, lost, alternative, undecided)
+    allowed = margin(len(x), float(np.var(x, ddof=1)), bound, alarm) + bound * (n - len(x)) / n
+    return Statistic(name, float(x.mean()), expected, allowed, n, lost, alternative, undecided)
 
 
 def _check_range(field: str, number: float, low: float, high: float) -> None:

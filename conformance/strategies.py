@@ -103,6 +103,7 @@ def states(draw: st.DrawFn, scene: Scene) -> tuple[State, float]:
     stream = HypothesisDraw(draw)
     state, t_end = start(stream, scene, when(stream, scene))
     assume(isinstance(plain.next_collision(scene, state, state.t), Horizon))  # inside, beyond rounding
+    assume(plain.Flight(scene, state, state.t).refusal() is None)  # and not along its wall
     t_end = state.t + (t_end - state.t) * stream.pick(WAITS)
     _tell(scene, state, t_end)
     return state, t_end

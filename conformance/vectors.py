@@ -49,6 +49,7 @@ OutcomeName = Literal["collision", "horizon", "undefined", "undecided", "rejecte
 LEVELS: tuple[Level, ...] = ("core", "extended", "stress")
 NUMBERS = ("dt", "x", "y", "vx", "vy")
 MANIFEST = "manifest.json"
+VERSIONS = ("1.0", "1.1", "1.2", "1.3", "1.4")  # of the corpus, all that were published
 Follow = Callable[[Scene, State, int, float], list[Outcome]]
 Decimal = Annotated[str, msgspec.Meta(pattern=r"^-?[0-9]{1,40}(\.[0-9]{1,40})?(E[+-]?[0-9]{1,4})?$")]
 Enclosure = tuple[Decimal, Decimal]
@@ -230,8 +231,13 @@ def load(level: str = "core", path: Path | None = None) -> list[Vector]:
         raise BadCorpus(f"level = {level!r}, must be one of {', '.join(LEVELS)}")
     wanted = LEVELS[: LEVELS.index(level) + 1]
     found: list[Vector] = []
+    seen: set[str] = set()
     for name, entry in manifest(path).files.items():
         held = _shipped(name, entry) if path is None else _read_lines(name, entry, path)
+        for vector in held:
+            if vector.id in seen:
+                raise BadCorpus(f"corpus {name}: id {vector.id} appears twice, must be unique")
+            seen.add(vector.id)
         found += [vector for vector in held if vector.level in wanted]
     return found
 

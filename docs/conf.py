@@ -5,6 +5,7 @@ makes every broken reference an error, and because autodoc shows signatures as t
 MathML when the site is built: a browser needs neither scripts nor a network for them.
 """
 
+import os
 import re
 import shutil
 import sys
@@ -59,12 +60,29 @@ copybutton_prompt_is_regexp = True
 WHOLE = ("audit", "bench")  # folders that are on the site as they are
 
 
+# Files outside docs/ that the site has as pages.
+PAGES = {
+    "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "theory/equations.md": "equations.md",
+}
+
+
+def new_figures(app: Any, name: str, text: list[str]) -> None:
+    """Take a page's numbers from the commands and files that have them, its pictures from its code."""
+    from docs import figures
+
+    text[0] = figures.refreshed(text[0]).replace("](gallery/", "](generated/")
+
+
 def in_the_repository(app: Any, name: str, text: list[str]) -> None:
-    """Point links that leave docs/ at the repository."""
+    """Point links that leave docs/ at the pages that the site makes of them, or else at the repository."""
     folder = (DOCS / name).parent
 
     def address(found: re.Match[str]) -> str:
         target = (folder / found[1]).resolve()
+        if target.is_relative_to(ROOT) and (page := PAGES.get(target.relative_to(ROOT).as_posix())):
+            return f"]({os.path.relpath(DOCS / page, folder)}"
         if target.is_relative_to(DOCS) or not target.is_relative_to(ROOT):
             return found[0]
         return f"]({REPOSITORY}{target.relative_to(ROOT).as_posix()}"
@@ -153,6 +171,12 @@ def copy_reports(app: Any, error: Exception | None) -> None:
             shutil.copytree(DOCS / name, Path(app.outdir) / name, dirs_exist_ok=True)
 
 
+def whole_options(app: Any, page: str, template: str, context: dict[str, Any], tree: Any) -> None:
+    """Mark the names of options, which a narrow page would break after their hyphens."""
+    if "body" in context:
+        context["body"] = re.sub(r'<span class="pre">(?=--)', '<span class="pre option">', context["body"])
+
+
 def as_mathml(is_block: bool) -> Any:
     """Return how a formula is written into a page."""
 
@@ -169,9 +193,11 @@ def setup(app: Any) -> None:
     app.add_html_math_renderer("mathml", (as_mathml(False), None), (as_mathml(True), None))
     app.connect("builder-inited", draw_gallery)
     app.connect("builder-inited", write_commands)
+    app.connect("source-read", new_figures)
     app.connect("source-read", in_the_repository)
     app.connect("include-read", included)
     app.connect("autodoc-process-docstring", plain_docstring, priority=400)  # before napoleon
     app.connect("autodoc-process-signature", bare_alias)
     app.connect("autodoc-skip-member", no_alias)
+    app.connect("html-page-context", whole_options)
     app.connect("build-finished", copy_reports)

@@ -2,11 +2,15 @@
 
 A block whose first line is three backticks and `python NAME.svg` leaves a matplotlib `figure`, or bytes: they
 are written as NAME.svg. The blocks of a page share their names, as a notebook's cells do. The site makes the
-pictures of all pages, and the tests run the same blocks.
+pictures of all pages, and the tests run the same blocks. `python -m docs.pictures` writes them into
+docs/gallery, where the pages find them in the repository. `blocks.json` beside them holds a digest of the
+code of each page, so that a test sees when it has changed.
 """
 
+import json
 import re
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +19,8 @@ from matplotlib.figure import Figure
 from conformance.files import write_file
 from mushrooms.figures import style
 
+DOCS = Path(__file__).resolve().parent
+GALLERY = DOCS / "gallery"
 BLOCK = re.compile(r"^```python (\S+\.(?:svg|png|gif))\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -38,3 +44,20 @@ def draw(page: Path, folder: Path) -> None:
         if isinstance(picture, Figure):
             picture = partial(style.save, picture, suffix=Path(name).suffix)
         write_file(folder / name, picture)
+
+
+def digests() -> dict[str, str]:
+    """Return a digest of the code of each page that makes pictures."""
+    codes = {page.name: "".join(code for _, code in blocks(page)) for page in sorted(DOCS.glob("*.md"))}
+    return {name: sha256(code.encode()).hexdigest() for name, code in codes.items() if code}
+
+
+def main() -> None:
+    """Write the pictures of all pages for the repository."""
+    for page in DOCS.glob("*.md"):
+        draw(page, GALLERY)
+    write_file(GALLERY / "blocks.json", json.dumps(digests(), indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

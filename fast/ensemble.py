@@ -552,11 +552,12 @@ def go_on(
     if before is None:
         done, seconds = plan.followed(plan.starts(), LANE_ROWS)
         return Paused(plan.ensemble(done, seconds), done.lanes, asked)
-    if not (isinstance(before, Paused) and isinstance(before.ensemble, Ensemble)):
-        raise BadInput(f"before = {shown(before)}, must be None or what go_on has returned")
+    _check_paused(before)
     _check_same(asked if before.asked is None else before.asked, asked)
+    _check_shape(plan, before)
     n_before, n_passed = _passed(plan, before)
-    done, seconds = plan.followed(np.full((n_particles, 6), np.nan), LANE_ROWS, before.lanes, n_passed)
+    unknown = np.full((plan.size[0], 6), np.nan)
+    done, seconds = plan.followed(unknown, LANE_ROWS, before.lanes, n_passed)
     after, anew = plan.ensemble(done, seconds), np.flatnonzero(done.codes == records.FOLLOW_ANEW)
     for name in BY_CYCLE:
         getattr(after, name)[:, :n_before] = getattr(before.ensemble, name)
@@ -569,6 +570,38 @@ def go_on(
         done.lanes[anew] = again.lanes
     seconds += before.ensemble.seconds * before.ensemble.threads / plan.threads
     return Paused(after._replace(seconds=seconds), done.lanes, asked)
+
+
+def _check_paused(before: object) -> None:
+    is_paused = (
+        isinstance(before, Paused)
+        and isinstance(before.ensemble, Ensemble)
+        and isinstance(before.lanes, np.ndarray)
+        and isinstance(before.asked, dict | None)
+    )
+    if not is_paused:
+        raise BadInput(f"before = {shown(before)}, must be None or what go_on has returned")
+
+
+def _check_shape(plan: Plan, before: Paused) -> None:
+    """Refuse arrays that are not those of the plan: numpy would repeat a single particle for all."""
+    there, lanes = before.ensemble, before.lanes
+    if there.energy0 != plan.energy0:
+        raise BadInput(f"before: energy = {there.energy0}, must be {plan.energy0}")
+    n, _, looks = plan.size
+    minima, phases = plan.stops.mouth_minima.shape[1], looks - 1
+    n_before = there.cycle_energies.shape[1] if np.ndim(there.cycle_energies) == 2 else 0
+    shapes = {
+        "lanes": (lanes, (n, LANE_ROWS)),
+        "ensemble.cycle_energies": (there.cycle_energies, (n, n_before)),
+        "ensemble.t_in": (there.t_in, (n, n_before, minima)),
+        "ensemble.t_out": (there.t_out, (n, n_before, minima)),
+        "ensemble.phase_energies": (there.phase_energies, (n, n_before, phases)),
+        "ensemble.phase_captured": (there.phase_captured, (n, n_before, phases)),
+    }
+    for name, (array, shape) in shapes.items():
+        if np.shape(array) != shape:
+            raise BadInput(f"before: {name} has the shape {np.shape(array)}, must have {shape}")
 
 
 def _check_same(there: dict[str, Any], asked: dict[str, Any]) -> None:

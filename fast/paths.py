@@ -234,11 +234,11 @@ def follow(
     Source: sec. 3.2 (capture).
     """
     check_scene(scene)
-    if until in EVENTS and not isinstance(scene, Mushroom):
+    if isinstance(until, str) and until in EVENTS and not isinstance(scene, Mushroom):
         raise BadInput(f"until = {until!r}: table is {type(scene).__name__.lower()}, must be mushroom")
     if isinstance(until, str) and until not in EVENTS:
         raise BadInput(f"until = {shown(until)}, must be {', '.join(EVENTS)} or an energy")
-    event = until if isinstance(until, str) else check_energy(until)
+    event = until if isinstance(until, str) else check_energy(check_number("until", until))
     most, end = check_count("n_collisions", n_collisions, 1, MAX_STEPS), check_end(t_end)
     if isinstance(states, State):
         return _reached(scene, states, event, end, most)

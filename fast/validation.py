@@ -53,7 +53,7 @@ def check_phases(phases: object) -> tuple[float, ...]:
     given = check_list("phases", phases, "a sequence of numbers that rise and lie in (0, 1)")
     found = tuple(check_number(f"phases[{i}]", phase) for i, phase in enumerate(given))
     if any(not a < b for a, b in pairwise([0.0, *found, 1.0])):
-        raise BadInput(f"phases = {shown(list(found))}, must rise and lie in (0, 1)")
+        raise BadInput(f"phases = {shown(found)}, must rise and lie in (0, 1)")
     return found
 
 

@@ -5,7 +5,6 @@ cycle, or s = log E1/E0; where there are any, t_in and t_out (ends of the first 
 captured (0 or 1), and x0, y0, where it started. The names that `mushrooms export` writes will do.
 """
 
-import csv
 import re
 from collections.abc import Iterable, Iterator
 from itertools import islice
@@ -28,12 +27,14 @@ from conformance.audit.ensemble import (
     reversal,
 )
 from conformance.audit.runs import BoolArray, FloatArray, scene_named
-from conformance.suite.sheet import read_number, read_rows
+from conformance.suite.sheet import read_names, read_number, read_rows
 from mushrooms.figures import energies
 from mushrooms.figures.style import ORANGE, SKY, STYLE, new_figure, svg
-from mushrooms.output import import_arrow, writable_folder, write_report
+from mushrooms.output import writable_folder, write_report
 from mushrooms.reports.audit_page import expected_text, figures_text, power_text, to_json
 from mushrooms.reports.page import embed, pull, render
+from mushrooms.store.run import GROUP, UNREADABLE, folder_of, open_run
+from mushrooms.tables import check_digest, import_arrow
 from scene.refusal import BadInput
 from scene.tables import Mushroom
 
@@ -309,11 +310,13 @@ def _is_start(label: str, start: FloatArray, energy: float, *, is_asked: bool) -
 def _parts(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
     """Yield parts of a table by what its columns are: (n, K) the energies after K cycles, (n,) all others."""
     readers = {".csv": _csv, ".parquet": _parquet, ".zarr": _zarr}
-    path = path / "ensemble.zarr" if (path / "ensemble.zarr").is_dir() else path
-    if path.suffix not in readers:
-        raise BadInput(f"{label}, must be a .csv or .parquet file, or a .zarr folder")
+    run = folder_of(path)
+    path = path / GROUP if (path / GROUP).is_dir() else path
+    if run is None and path.suffix not in readers:
+        raise BadInput(f"{label}, must be a .csv or .parquet file, a .zarr folder, or the folder of a run")
+    parts = readers[path.suffix](path, label) if run is None else _run(run)
     try:
-        for raw in readers[path.suffix](path, label):
+        for raw in parts:
             named = {what: [raw[name] for name in names] for what, names in _find_columns(label, raw).items()}
             stacked = {what: np.column_stack(columns) for what, columns in named.items()}
             yield {
@@ -322,6 +325,17 @@ def _parts(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
             }
     except OSError as error:
         raise BadInput(f"{label} cannot be read: {error.strerror or error}") from None
+    except MemoryError:
+        raise BadInput(f"{label} cannot be read: it asks for more memory than there is") from None
+
+
+def _run(folder: Path) -> Iterator[dict[str, FloatArray]]:
+    """Yield the blocks of a run of `mushrooms simulate --out`, which is held to its checksums."""
+    run = open_run(folder)
+    for number in range(run.shape.n_blocks):
+        part = {"cycle_energies": run.read(number, "cycle_energies")}
+        part |= {name: run.read(number, name)[:, 0] for name in ("t_in", "t_out") if name in run.shape.names}
+        yield {"E0": np.full(run.shape.rows(number), run.spec.energy), **part}
 
 
 def _find_columns(label: str, names: Iterable[str]) -> dict[str, list[str]]:
@@ -343,8 +357,8 @@ def _csv(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
 
     Of a million rows of two columns Arrow takes half a second, the reader by cells four.
     """
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        header = [name.strip() for name in next(csv.reader(file), [])]
+    check_digest(path, label)
+    header = read_names(path, label)
     wanted, n_done = _select_columns(label, header), 0
     try:
         from pyarrow import csv as arrow
@@ -369,26 +383,42 @@ def _cell(place: str, name: str, word: str) -> float:
 def _parquet(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
     arrow, parquet = import_arrow()
     try:
-        with parquet.ParquetFile(path) as file:
-            wanted = _select_columns(label, file.schema_arrow.names)
+        with parquet.ParquetFile(path, page_checksum_verification=True) as file:
+            names = file.schema_arrow.names
+            wanted = _select_columns(label, names)
+            twice = next((name for name in wanted if names.count(name) > 1), None)
+            if twice is not None:
+                raise BadInput(f"{label}: column {twice!r} stands twice")
             for batch in file.iter_batches(PART, columns=wanted):
                 columns = ((name, batch.column(name).cast("float64")) for name in wanted)
                 yield {name: column.to_numpy(zero_copy_only=False) for name, column in columns}
-    except (arrow.ArrowInvalid, arrow.ArrowNotImplementedError, KeyError) as error:  # a name that comes twice
-        raise BadInput(f"{label}: {error}") from None
+    except (arrow.ArrowException, LookupError, UnicodeError, OverflowError) as error:
+        raise BadInput(f"{label} cannot be read: {error}") from None
 
 
 def _zarr(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
+    """Yield parts of a Zarr group of another program, which has no checksums of ours."""
     try:
         group: Any = zarr.open_group(path, mode="r")
-    except (OSError, ValueError, KeyError) as error:
+        names = list(group.array_keys())
+    except UNREADABLE as error:
         raise BadInput(f"{label} is no Zarr group: {error}") from None
-    arrays = {name: group[name] for name in _select_columns(label, group.array_keys())}
-    lengths = {name: array.shape[0] if array.ndim else 1 for name, array in arrays.items()}
+    wanted = _select_columns(label, names)
+    try:
+        arrays = {name: group[name] for name in wanted}
+        lengths = {name: array.shape[0] if array.ndim else 1 for name, array in arrays.items()}
+    except UNREADABLE as error:
+        raise BadInput(f"{label} cannot be read: {error}") from None
     if len(set(lengths.values())) > 1:
         raise BadInput(f"{label}: arrays of {lengths} particles, must be as many in each")
     for first in range(0, next(iter(lengths.values())), PART):
-        part = {name: np.asarray(array[first : first + PART], np.float64) for name, array in arrays.items()}
-        for name, values in part.items():
-            part[name] = values if values.ndim == 1 or name == "cycle_energies" else values[:, 0]
-        yield part
+        yield {name: _values(label, name, array, first) for name, array in arrays.items()}
+
+
+def _values(label: str, name: str, array: Any, first: int) -> FloatArray:
+    """Return part of an array of a Zarr group; of several cycles only energies have more than the first."""
+    try:
+        values = np.asarray(array[first : first + PART], np.float64)
+    except UNREADABLE as error:
+        raise BadInput(f"{label}: array {name!r} cannot be read: {error}") from None
+    return values if values.ndim == 1 or name == "cycle_energies" else values[:, 0]

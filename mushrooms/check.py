@@ -2,6 +2,7 @@
 
 import secrets
 import shlex
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
+from conformance import vectors
 from conformance.files import write_file
 from conformance.suite import VERDICTS, Run, check, read_known, reports
 from conformance.suite.run import NEW_SEEDS, choose
@@ -23,7 +25,15 @@ from conformance.suite.sheet import (
     write_lines,
     write_tables,
 )
-from mushrooms.output import Watch, check_file, new_console, progress_bar, refuse_unheeded, writable_folder
+from mushrooms.output import (
+    Watch,
+    check_file,
+    new_console,
+    print_table,
+    progress_bar,
+    refuse_unheeded,
+    writable_folder,
+)
 from scene import BadInput
 
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
@@ -82,6 +92,19 @@ def check_stepper(
     return run.exit_code()
 
 
+def require_corpus(version: str | None) -> None:
+    """Refuse a run with another corpus than the one asked for; None for any.
+
+    Raises:
+        BadInput: naming the version that is here, and those that exist.
+    """
+    here = vectors.manifest().corpus
+    if version is not None and version != here:
+        known = ", ".join(vectors.VERSIONS)
+        why = "is that of an earlier release" if version in vectors.VERSIONS else "does not exist"
+        raise BadInput(f"corpus = {version!r} {why}, must be {here}; there are {known}")
+
+
 def _names_of(groups: str) -> list[str]:
     names = [name.strip() for name in groups.split(",") if name.strip()]
     if groups and not names:
@@ -125,7 +148,8 @@ def show(run: Run) -> None:
     seen = [verdict for verdict in VERDICTS if verdict == "pass" or groups[-1].counts[verdict]]
     verdicts = [Column(verdict, style=COLOURS.get(verdict, "bold red"), justify="right") for verdict in seen]
     numbers = [Column(name, justify="right") for name in ("worst ulps", "A/B/C", "class")]
-    table = Table("group", Column("cases", justify="right"), *verdicts, *numbers, title=_title(run))
+    heads = [Column("group", no_wrap=True), Column("cases", justify="right"), *verdicts, *numbers]
+    table = Table(*heads, title=_title(run))
     for group in groups:
         counts = [str(group.counts[verdict]) for verdict in seen]
         graded = ["–", "–"]
@@ -135,7 +159,7 @@ def show(run: Run) -> None:
         row = [group.group, str(group.cases), *counts, *graded, group.precision]
         table.add_row(*row, end_section=group is groups[-2])
     console = new_console(soft_wrap=True)
-    console.print(table)
+    print_table(console, table)
     if run.speed:
         console.print(
             f"Speed on {run.speed.scene}: {run.speed.best_ns:.4g} ns per collision,"
@@ -212,7 +236,7 @@ def write_questions(path: Path, level: str, seed: int | None) -> None:
     seed = secrets.randbelow(NEW_SEEDS) if seed is None else seed
     if path.suffix == ".jsonl":
         check_file(path, (".jsonl",))
-        sheet = Sheet(level, seed)
+        sheet = _draw_sheet(level, seed)
         n = write_lines(sheet, path)
     elif path.suffix:
         raise BadInput(f"--questions = {str(path)!r}, must end in .jsonl, or be a folder for CSV")
@@ -220,11 +244,17 @@ def write_questions(path: Path, level: str, seed: int | None) -> None:
         with writable_folder(path) as folder:
             if any(folder.iterdir()):
                 raise BadInput(f"--questions = {str(path)!r} is not empty, must be a new folder")
-            sheet = Sheet(level, seed)
+            sheet = _draw_sheet(level, seed)
             n = write_tables(sheet, folder)
     more = f", {len(sheet.questions) - n} left out that CSV cannot hold" if n < len(sheet.questions) else ""
     print(f"{n} questions of level {level} and seed {seed}{more}: {path}")
     print(f"Grade the answers with: mushrooms check --questions {path} --answers FILE")
+
+
+def _draw_sheet(level: str, seed: int) -> Sheet:
+    """Return the questions of a run, and say that they take a while: many are proved anew."""
+    print(f"drawing and proving the questions of seed {seed}: some 20 seconds", file=sys.stderr, flush=True)
+    return Sheet(level, seed)
 
 
 def grade_file(answers: Path, questions: Path | None, level: str, seed: int | None) -> Run:

@@ -8,13 +8,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import fast
-from conformance.audit.runs import scene_named
+from conformance.audit.runs import is_scene, scene_named
 from conformance.files import write_file
 from mushrooms import orbits
 from mushrooms.figures import energies, orbits as pictures, style, table as tables
-from mushrooms.output import TABLES, announce_compilation, check_file, progress_bar, refuse_unheeded
+from mushrooms.output import Watch, announce_compilation, check_file, progress_bar, refuse_unheeded
 from mushrooms.simulate import draw_energies
 from mushrooms.store.run import is_run, open_run
+from mushrooms.tables import SUFFIXES
 from scene import BadInput, Scene, Stem
 from scene.laws import bounds
 from scene.tables import laws
@@ -62,14 +63,17 @@ class DrawOptions(NamedTuple):
         usual = usual_of(kind, scene, self.phase)
         n_cycles = self.cycles or (None if self.collisions else usual.n_cycles)
         n_collisions = self.collisions or (None if n_cycles else usual.n_collisions)
-        return orbits.follow(
-            scene,
-            n_collisions or orbits.MAX_COLLISIONS,
-            energy=self.energy or orbits.usual_energy(scene, usual.crossings),
-            seed=self.seed or 0,
-            n_orbits=n_orbits or self.particles or usual.n_orbits,
-            n_cycles=n_cycles,
-        )
+        n = n_orbits or self.particles or usual.n_orbits
+        with progress_bar() as bar:
+            return orbits.follow(
+                scene,
+                n_collisions or orbits.MAX_COLLISIONS,
+                energy=self.energy or orbits.usual_energy(scene, usual.crossings),
+                seed=self.seed or 0,
+                n_orbits=n,
+                n_cycles=n_cycles,
+                progress=partial(Watch(bar, "particles", "particles").update, n_total=n),
+            )
 
 
 def usual_of(kind: str, scene: Scene, phase: float | None) -> Usual:
@@ -83,14 +87,14 @@ def draw_scene(
     name: str, out: Path | None, kinds: list[str], export: Path | None, options: DrawOptions
 ) -> None:
     """Draw pictures of a scene, or of a stored run, and export a trajectory; print the names of the files."""
-    if is_run(Path(name)):
+    if is_run(Path(name)) or (Path(name).is_dir() and not is_scene(name)):
         asked = {f"--{kind}": True for kind in kinds} | {"--export": export}
         refuse_unheeded(asked | options.given(), f"{name!r} is a run")
         _draw_run(Path(name), out)
         return
     scene = scene_named(name)
     _check_heeded(kinds, export, options)
-    check_file(export, tuple(TABLES))
+    check_file(export, SUFFIXES)
     is_drawn = kinds or export is None or out is not None
     paths = _paths(scene, out or Path(f"{Path(name).stem}.svg"), kinds) if is_drawn else {}
     with announce_compilation():
@@ -146,9 +150,12 @@ def _paths(scene: Scene, out: Path, kinds: list[str]) -> dict[str, Path]:
 def _draw(kind: str, suffix: str, scene: Scene, options: DrawOptions, file: BinaryIO) -> None:
     """Draw one kind of picture into an open file."""
     if kind == "walls":
-        tables.write_picture(scene, suffix, file)
+        with progress_bar() as bar:
+            tables.write_picture(scene, suffix, file, Watch(bar, "GIF", "frames").update)
     elif kind == "trajectory" and suffix == ".gif":
-        pictures.write_animation(options.follow(scene, kind, 1)[0], file)
+        [orbit] = options.follow(scene, kind, 1)
+        with progress_bar() as bar:
+            pictures.write_animation(orbit, file, progress=Watch(bar, "GIF", "frames").update)
     elif kind == "growth" and options.particles != 1:
         style.save(_growth(scene, options), file, suffix)
     else:
@@ -177,6 +184,14 @@ def _growth(scene: Scene, options: DrawOptions) -> Figure:
     usual = PICTURES["growth"]
     energy = options.energy or orbits.usual_energy(scene, usual.crossings)
     n, n_cycles = options.particles or usual.n_orbits, options.cycles or usual.n_cycles or 1
-    found = fast.simulate(scene, n_particles=n, energy=energy, n_cycles=n_cycles, seed=options.seed or 0)
+    with progress_bar() as bar:
+        found = fast.simulate(
+            scene,
+            n_particles=n,
+            energy=energy,
+            n_cycles=n_cycles,
+            seed=options.seed or 0,
+            progress=partial(Watch(bar, "particles", "particles").update, n_total=n),
+        )
     gains = np.log(found.cycle_energies[found.takes_part()] / energy)
     return energies.growth(scene, energy, gains, n)

@@ -8,10 +8,9 @@ adiabatic theory predicts for these intervals. Pictures: `mushrooms.figures.orbi
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,11 +21,11 @@ from mpmath import fp
 import fast
 import scene as scenes
 import theory
-from conformance.files import write_file
 from fast.ensemble import initial_states
 from fast.paths import captured, sin_phi
-from fast.validation import check_energy
-from mushrooms.output import TABLES, check_file
+from fast.validation import check_energy, check_progress
+from mushrooms.output import check_file
+from mushrooms.tables import SUFFIXES, describe, write_table
 from scene import Outcome, Scene, State, Stem, Wall, check_scene
 from scene.geometry import TableAt, table_at
 from scene.laws import FloatArray, is_constant, values
@@ -78,6 +77,7 @@ class FollowedOrbit:
         walls: (n,) the walls hit.
         steps: (n, 6) dt, t, x, y, vx, vy after each collision.
         outcome: None if all collisions asked for were found, else the outcome that ended the path.
+        seed: of which the start was drawn; None where it was given.
     """
 
     scene: Scene
@@ -85,6 +85,7 @@ class FollowedOrbit:
     walls: list[Wall]
     steps: FloatArray
     outcome: Outcome | None
+    seed: int | None = None
 
     def states(self) -> FloatArray:
         """Return (n + 1, 5): t, x, y, vx, vy at the start and after each collision."""
@@ -212,14 +213,16 @@ class FollowedOrbit:
         return found
 
     def write(self, path: Path | str) -> None:
-        """Write the columns as .csv (floats in shortest round-trip form) or .parquet, with the scene.
+        """Write the columns as .csv (floats in shortest round-trip form) or .parquet.
+
+        Scene, energy, seed and version go with them: see `mushrooms.tables`.
 
         Raises:
             BadInput: another ending, or pyarrow is not installed.
         """
-        check_file(Path(path), tuple(TABLES))
-        scene = json.dumps(scenes.to_data(self.scene))
-        write_file(Path(path), partial(TABLES[Path(path).suffix], [self.columns()], scene=scene))
+        check_file(Path(path), SUFFIXES)
+        about = describe(self.scene, energy=float(self.energies()[0]), seed=self.seed)
+        write_table(Path(path), [self.columns()], about)
 
 
 def usual_energy(scene: Scene, crossings: float = CROSSINGS) -> float:
@@ -237,6 +240,7 @@ def follow(
     seed: int = 0,
     n_orbits: int = 1,
     n_cycles: int | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> list[FollowedOrbit]:
     """Follow particles from drawn starts, uniform in area and direction when the cycle begins.
 
@@ -248,6 +252,7 @@ def follow(
         seed: 0 to 2^64 - 1; particle i is particle i of `fast.simulate` at this energy and seed.
         n_orbits: number of particles, 1 to 1000.
         n_cycles: cycles of the walls after which to stop, if the collisions do not end before.
+        progress: called with the number of particles that have been followed.
 
     Raises:
         BadInput: naming field, value and bound.
@@ -261,8 +266,13 @@ def follow(
     if n_cycles is not None:
         n_cycles = check_count("n_cycles", n_cycles, 1, MAX_COLLISIONS)
         end = start_time(scene) + n_cycles * (scene.period or 1.0)
-    rows = initial_states(scene, n_orbits, energy, seed)
-    return [from_state(scene, State(row[0], *row[2:]), n_collisions, end) for row in rows.tolist()]
+    tell = check_progress(progress) or (lambda _n_done: None)
+    found = []
+    for row in initial_states(scene, n_orbits, energy, seed).tolist():
+        orbit = from_state(scene, State(row[0], *row[2:]), n_collisions, end)
+        found.append(replace(orbit, seed=seed))
+        tell(len(found))
+    return found
 
 
 def from_state(scene: Scene, start: State, n_collisions: int, t_end: float = math.inf) -> FollowedOrbit:

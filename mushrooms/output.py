@@ -1,7 +1,5 @@
-"""What commands share: results as lines, what is shown while one waits, files, folders, tables as files."""
+"""What commands share: results as lines, what is shown while one waits, files, folders."""
 
-import csv
-import io
 import json
 import math
 import os
@@ -9,14 +7,14 @@ import platform
 import shutil
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from itertools import chain
 from pathlib import Path
-from typing import Any, BinaryIO, TextIO
+from typing import Any, TextIO
 
 from rich import progress
 from rich.console import Console
+from rich.table import Table
 
 from conformance.files import named, part, write_files
 from scene import BadInput
@@ -24,11 +22,14 @@ from scene import BadInput
 FIRST, EVERY = 20.0, 60.0  # seconds to the first line, and between lines, where there is no terminal
 CLOCK = time.monotonic
 UNITS = ((1.0, "seconds"), (60.0, "minutes"), (3600.0, "hours"), (86400.0, "days"))
-# The compiled functions that a person waits for, and how long in all; the others take a few seconds.
+# The kernels of `fast.kernel` that take more than three seconds to compile, and how long a command waits in
+# all. `loop` is a step of the lanes.
 SLOW_TO_COMPILE = {
-    "careful_step": "about half a minute",
+    "scalar_step": "about half a minute",
+    "loop": "about half a minute",
     "follow_particles": "about half a minute",
-    "fine": "about ten seconds",
+    "follow_path": "about half a minute",
+    "fine_path": "about ten seconds",
 }
 
 
@@ -46,10 +47,13 @@ def announce_compilation() -> Iterator[None]:
         def on_start(self, compilation: Any) -> None:
             compiled = compilation.data["dispatcher"]
             duration = SLOW_TO_COMPILE.get(compiled.py_func.__name__)
-            if duration is not None and compiled.stats.cache_path and duration not in announced:
+            is_ours = compiled.py_func.__module__.startswith("fast.")
+            if is_ours and duration is not None and duration not in announced:
                 announced.add(duration)
                 what = f"compiling the fast stepper for this machine: {duration}"
-                print(f"{what}; kept for next time", file=sys.stderr, flush=True)
+                is_kept = bool(compiled.stats.cache_path)
+                next_time = "kept for next time" if is_kept else "no folder can be written in to keep it"
+                print(f"{what}; {next_time}", file=sys.stderr, flush=True)
 
         def on_end(self, compilation: Any) -> None:
             pass
@@ -62,6 +66,13 @@ def new_console(*, soft_wrap: bool = False) -> Console:
     """Return a console for stdout whose tables fit its width, or COLUMNS; a pipe has room enough for them."""
     size = shutil.get_terminal_size((140, 25))
     return Console(width=size.columns, height=size.lines, soft_wrap=soft_wrap, highlight=False)
+
+
+def print_table(console: Console, table: Table) -> None:
+    """Print a table in which no word and no number is cut: a terminal that is too narrow breaks the lines."""
+    at_ease = console.options.update(max_width=10_000)
+    console.width = max(console.width, console.measure(table, options=at_ease).minimum)
+    console.print(table)
 
 
 def progress_bar() -> progress.Progress:
@@ -266,57 +277,6 @@ def check_file(path: Path | None, suffixes: tuple[str, ...]) -> None:
 def _probe(path: Path) -> None:
     part(path).write_bytes(b"")
     part(path).unlink()
-
-
-def import_arrow() -> tuple[Any, Any]:
-    """Import pyarrow and its Parquet module.
-
-    Raises:
-        BadInput: it is not installed.
-    """
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        how = "pip install 'oscillating-mushrooms[parquet]'"
-        raise BadInput(f"a .parquet file needs pyarrow: {how}") from None
-    return pyarrow, pyarrow.parquet
-
-
-def write_csv(tables: Iterable[Mapping[str, Any]], file: BinaryIO, *, scene: str = "") -> None:
-    """Write tables of the same columns one below the other; numbers read back to the same bits.
-
-    Args:
-        tables: columns by their names, lists or arrays; one table at least.
-        file: open for binary writing.
-        scene: has no place in a CSV file.
-    """
-    for number, columns in enumerate(tables):
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        if number == 0:
-            writer.writerow(columns)
-        lists = (column.tolist() if hasattr(column, "tolist") else column for column in columns.values())
-        writer.writerows(zip(*lists, strict=True))
-        file.write(text.getvalue().encode())
-
-
-def write_parquet(tables: Iterable[Mapping[str, Any]], file: BinaryIO, *, scene: str = "") -> None:
-    """Write tables of the same columns, each as a row group, with a scene as metadata.
-
-    Raises:
-        BadInput: pyarrow is not installed.
-    """
-    arrow, parquet = import_arrow()
-    parts = map(arrow.table, tables)
-    first = next(parts)
-    schema = first.schema.with_metadata({"scene": scene} if scene else None)
-    with parquet.ParquetWriter(file, schema) as writer:  # else it would close itself later, in a page
-        for part in chain([first], parts):
-            writer.write_table(part.cast(schema))
-
-
-TABLES = {".csv": write_csv, ".parquet": write_parquet}  # writers, by the ending of the file
 
 
 def _remove_empty(folders: list[Path]) -> None:

@@ -5,12 +5,12 @@ import math
 import sys
 from typing import Any
 
-from rich.table import Table
+from rich.table import Column, Table
 
 import scene as scenes
 import theory
 from conformance.audit.runs import SCENES, scene_named
-from mushrooms.output import new_console, print_pairs, progress_bar
+from mushrooms.output import new_console, print_pairs, print_table, progress_bar
 from mushrooms.store.summary import expected_collisions
 from scene import BadInput, Scene
 from scene.load import catalogue_text, read_data
@@ -30,14 +30,14 @@ def print_scenes(name: str, as_toml: bool, as_json: bool) -> None:
     if as_json:
         print(json.dumps(rows or of_audit or read_data(name), indent=2, ensure_ascii=False))
         return
-    table = Table("name", "table", "period", "notes", title="Catalogue")
+    table = Table(Column("name", no_wrap=True), "table", "period", "notes", title="Catalogue")
     for row in rows:
         length = (
             "refused" if row["refused"] else "static" if row["period"] is None else f"{row['period']:.6g}"
         )
         notes = f"Refused: {row['refused']}" if row["refused"] else row["notes"]
         table.add_row(row["name"], row["table"], length, notes)
-    new_console().print(table)
+    print_table(new_console(), table)
 
 
 def _toml(data: dict[str, Any]) -> str:

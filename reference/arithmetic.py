@@ -12,10 +12,9 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-import mpmath
 from mpmath.libmp import libelefun, libmpf, libmpi
 
-from scene.precision import CONSTANTS, intervals
+from scene.precision import CONSTANTS, ExactMpf, intervals, reduce_record
 
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
@@ -57,10 +56,14 @@ class WorkLimit:
 
 
 class Enclosure(NamedTuple):
-    """lo <= truth <= hi, both exact mpf."""
+    """lo <= truth <= hi, both exact mpf; copies and pickles keep every bit."""
 
     lo: Any
     hi: Any
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Tell pickle and copy how to keep every bit."""
+        return reduce_record(self)
 
     def __float__(self) -> float:
         """Return the centre, correctly rounded to binary64."""
@@ -99,6 +102,12 @@ def rational(raw: tuple[int, int, int, int]) -> Fraction:
     """Return the rational that a raw finite mpf stands for."""
     numerator, denominator = libmpf.to_rational(raw)
     return Fraction(int(numerator), int(denominator))
+
+
+def exact_number(raw: tuple[int, int, int, int]) -> ExactMpf:
+    """Return the number that a raw finite mpf stands for."""
+    is_negative, mantissa, exponent, _ = raw
+    return ExactMpf.of(-mantissa if is_negative else mantissa, exponent)
 
 
 def exact_ends(interval: Interval) -> tuple[Fraction, Fraction]:
@@ -240,7 +249,7 @@ class Arithmetic:
     def enclosure(self, x: Interval) -> Enclosure:
         """Return the ends as exact numbers, free of this context."""
         lo, hi = x._mpi_
-        return Enclosure(mpmath.mp.make_mpf(lo), mpmath.mp.make_mpf(hi))
+        return Enclosure(exact_number(lo), exact_number(hi))
 
 
 def sign(x: Interval) -> int:

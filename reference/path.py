@@ -57,7 +57,8 @@ def next_collision(
     Args:
         scene: table and laws of motion; numbers are exact binary64.
         state: position (x, y) [length], velocity (vx, vy) [length/time], wall being left or None.
-        t_end: horizon [time], t_end >= state.t; a wall met at t_end exactly is not met before it.
+        t_end: horizon [time], t_end >= state.t; a wall met at t_end exactly is not met before it. A state
+            at t_end has arrived: the outcome is Horizon, even if no flight could begin there.
         digits: correct decimals wanted, 1 to 10,000; guard digits are added inside.
         is_differentiated: whether to return the Jacobian of the step.
         is_measured: whether to return the margins of the collision.
@@ -187,6 +188,10 @@ def _follow(
     outcome: Outcome | None
     try:
         course = depart(arithmetic, scene, state, None if t_end is None else Fraction(float(t_end)))
+        if isinstance(course, Undefined):
+            # Nothing comes next, and nothing need come where no step is asked for, or no time is left.
+            end = arrived(arithmetic, state) if t_end == state.t else course
+            return Trajectory(steps, end if n_collisions else None, arithmetic.digits)
         outcome, jacobian = _extend(steps, n_collisions, course, is_differentiated, is_measured)
         if outcome is None and steps and digits is not None:
             require_digits(steps[-1], digits)
@@ -200,13 +205,11 @@ def _follow(
 def _extend(
     steps: list[ProvedCollision],
     n_collisions: int,
-    course: Course | Undefined,
+    course: Course,
     is_differentiated: bool,
     is_measured: bool,
 ) -> tuple[Outcome | None, Jacobian | None]:
     """Add steps until there are enough, or another outcome comes. Return it, else the Jacobian."""
-    if isinstance(course, Undefined):
-        return course, None
     arithmetic, matrix = course.arithmetic, identity(course.arithmetic)
     while len(steps) < n_collisions:
         hit = course.event()
@@ -280,6 +283,12 @@ def collision(course: Course, hit: Hit, after: Bounce) -> ProvedCollision:
         EnclosedFlight._make((flight.instant, *map(close, flight[1:]))),
         close(hit.time),
     )
+
+
+def arrived(arithmetic: Arithmetic, state: State) -> ProvedHorizon:
+    """Return a state that is at the horizon."""
+    numbers = (arithmetic.number(value) for value in (state.t, state.x, state.y, state.vx, state.vy))
+    return ProvedHorizon(Moment(*map(arithmetic.enclosure, numbers)), arithmetic.digits)
 
 
 def horizon(course: Course) -> ProvedHorizon:

@@ -13,7 +13,7 @@ import numpy as np
 from mpmath import fp
 
 from scene.laws import value
-from scene.precision import decimals
+from scene.precision import decimals, reduce_record
 from scene.states import ON_WALL, State
 from scene.tables import Cap, Scene, Stem, Wall, laws, width_factors
 
@@ -40,6 +40,10 @@ class TableAt(NamedTuple):
     w_rate: Any
     h_rate: Any
     slope_rate: Any
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Tell pickle and copy how to keep every bit."""
+        return reduce_record(self)
 
     @property
     def size(self) -> Any:

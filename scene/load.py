@@ -13,9 +13,12 @@ from typing import Any
 
 import msgspec
 
-from scene.laws import BangBang, Fourier
+from scene.laws import MAX_HARMONICS, MAX_KNOTS, BangBang, Fourier
 from scene.refusal import InvalidScene, shown
-from scene.tables import PARAMETERS, Cap, Mushroom, Scene, Stem, check_scene
+from scene.tables import HIDDEN, PARAMETERS, Cap, Mushroom, Scene, Stem, check_scene
+
+# What a text may hold, as a pattern that a schema in ASCII can hold.
+SHOWN = "".join(c if " " <= c <= "~" else f"\\u{ord(c):04x}" for c in f"^[^{HIDDEN.pattern[1:]}*$")
 
 
 def catalogue() -> list[str]:
@@ -166,15 +169,26 @@ def _without_none(field: Any) -> Any:
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a scene file, published as docs/scene.schema.json."""
     schema = msgspec.json.schema(Scene)
-    state_omega_or_period(schema["$defs"])
+    limit_definitions(schema["$defs"])
     for table in ("Cap", "Stem", "Mushroom"):
         schema["$defs"][table]["properties"]["$schema"] = {"type": "string"}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Scene", **schema}
 
 
-def state_omega_or_period(definitions: dict[str, Any]) -> None:
-    """Say in a schema's definitions that a Fourier law gives exactly one of `omega` and `period`."""
-    fourier = definitions["Fourier"]
+def limit_definitions(definitions: dict[str, Any]) -> None:
+    """Put what a schema can say of the rules for scenes (`scene.protocol.rules`) into its definitions."""
+    fourier, knots = definitions["Fourier"], definitions["BangBang"]["properties"]["knots"]
     for field in ("omega", "period"):
-        fourier["properties"][field] = {"type": "number"}
+        fourier["properties"][field] = {"type": "number", "exclusiveMinimum": 0}
     fourier["oneOf"] = [{"required": ["omega"]}, {"required": ["period"]}]
+    for field in ("cos", "sin"):
+        fourier["properties"][field]["maxItems"] = MAX_HARMONICS
+    knots |= {"minItems": 2, "maxItems": MAX_KNOTS}
+    mushroom = definitions["Mushroom"]
+    for field in ("w", "nu"):
+        forms = mushroom["properties"][field]["anyOf"]
+        mushroom["properties"][field] = {"anyOf": [form for form in forms if form != {"type": "null"}]}
+    mushroom["oneOf"] = [{"required": ["w"]}, {"required": ["nu"]}]
+    for table in ("Cap", "Stem", "Mushroom"):
+        for field in ("name", "notes"):
+            definitions[table]["properties"][field]["pattern"] = SHOWN

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 MAX_SEED = 2**64 - 1
+FEW = 6  # parts of a list that a message shows
 
 
 class BadInput(ValueError):  # noqa: N818 (the caller's input is bad, not the program)
@@ -107,7 +108,16 @@ def shown(value: object) -> str:
     """Return a value as a message shows it: on one line, and short."""
     if isinstance(value, int) and value.bit_length() > 256:  # Python refuses to print the longest
         return f"an integer of {value.bit_length()} bits"
-    if not (value is None or isinstance(value, numbers.Number | str)):  # long, or nested too deep to print
+    if isinstance(value, list | tuple) and all(map(_is_plain, value[:FEW])):
+        text = ", ".join(map(shown, value[:FEW]))
+        more = ", ..." if len(value) > FEW else "," * (isinstance(value, tuple) and len(value) == 1)
+        text = f"[{text}{more}]" if isinstance(value, list) else f"({text}{more})"
+    elif not (value is None or _is_plain(value)):  # long, or nested too deep to print
         return f"an object of type {type(value).__name__}"
-    text = " ".join(repr(value).split())
+    else:
+        text = " ".join(repr(value).split())
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _is_plain(value: object) -> bool:
+    return isinstance(value, numbers.Number | str)

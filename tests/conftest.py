@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import pytest
 from hypothesis import settings
 from numba.core.dispatcher import Dispatcher
+from support import plain_terminal  # noqa: F401
 from support.entries import kept_entries
 
 import fast
@@ -57,6 +58,9 @@ LONGEST = [
     "test_theory_finite_energy.py",
     "test_hard_cases.py",
     "test_mushrooms_draw.py",
+    "test_mushrooms_claim_figures.py",
+    "test_mushrooms_figures.py",
+    "test_conformance_given_ensembles.py",
     "test_conformance_grading.py",
     "test_mushrooms_check.py",
     "test_theory_upright.py",
@@ -116,10 +120,21 @@ def _few_fresh_questions() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _two_cores() -> Iterator[None]:
+    """Let tests ask for two threads on a machine with one core."""
+    n_cores = max(2, os.cpu_count() or 1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "cpu_count", lambda: n_cores)
+        yield
+
+
 @pytest.fixture(scope="session")
 def corpus() -> list[Vector]:
     """Return all vectors."""
-    return load("stress")
+    found = load("stress")
+    assert len(found) > 2000
+    return found
 
 
 @pytest.fixture

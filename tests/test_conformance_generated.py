@@ -48,7 +48,8 @@ from fast import paths
 from fast.__main__ import carry, follow
 from scene import BadInput, BangBang, Cap, Fourier, Horizon, Mushroom, Rejected, State, Undecided, from_data
 from scene.laws import MAX_KNOTS
-from scene.tables import laws
+from scene.protocol.rules import may_be_refused
+from scene.tables import laws, period
 
 # The fault, and the row of the table of families whose questions it answers wrong; none for a run's first.
 FAULTS: dict[str, tuple[Mutant, str]] = {
@@ -422,6 +423,20 @@ def test_no_question_is_asked_as_it_is_published(corpus):
     """But where all that can be changed is its sign, and nothing has one."""
     same = [v.id for v in corpus if draw_transform(v, 3).apply(v) == v]
     assert len(same) < 0.01 * len(corpus), same
+
+
+def test_no_question_becomes_one_that_may_be_refused(corpus):
+    """In a table at rest lateness counts units of time, which a transform changes."""
+    n_late, n_scaled = 0, 0
+    valid = ((v, from_data(v.scene)) for v in corpus if v.expect[0].outcome != "rejected")
+    for vector, scene in ((v, scene) for v, scene in valid if period(scene) is None):
+        for seed in range(3):
+            worn = draw_transform(vector, seed)
+            image, is_late = worn.apply(vector), may_be_refused(scene, vector.state)
+            assert may_be_refused(from_data(image.scene), image.state) == is_late, (vector.id, str(worn))
+            n_late, n_scaled = n_late + is_late, n_scaled + bool(worn.time)
+    assert n_late > 30
+    assert n_scaled > 1000
 
 
 def test_a_transform_is_taken_back_without_a_rounding(corpus):

@@ -46,6 +46,7 @@ from scene import (
     State,
     Stem,
     Undecided,
+    Undefined,
     check_scene,
     from_data,
     load,
@@ -254,24 +255,30 @@ def test_numbers_of_other_kinds_are_taken_and_undecided_answers_not_compared():
         assert not check(plain.next_collision, *corner)
 
 
-def lost(share):
-    """Keep every velocity, and lose a share of the particles."""
+def lost(share, outcome):
+    """Keep every velocity, and give a share of the particles another outcome."""
 
     def flow(_scene, states, t_end):
         kept = [(Horizon(t_end, s.x, s.y, s.vx, s.vy), None) for s in states]
         n = round(share * len(states))
-        return [(Undecided("shy"), None)] * n + kept[n:]
+        return [(outcome, None)] * n + kept[n:]
 
     return flow
 
 
 @pytest.mark.parametrize(
-    ("share", "n", "word"),
-    [(0.0, 4000, "0 lost"), (0.5, 4000, "2000 lost.*at most 1% may be"), (1.0, 20, "nan")],
+    ("share", "outcome", "n", "word"),
+    [
+        (0.0, Undefined("corner"), 4000, "0 lost"),
+        (0.5, Undefined("corner"), 4000, "2000 lost.*at most 1% may be"),
+        (1.0, Undefined("corner"), 20, "nan"),
+        (0.5, Undecided("shy"), 4000, "0 lost, 2000 undecided.*anything would do"),
+        (1.0, Undecided("shy"), 20, "20 undecided.*anything would do"),
+    ],
 )
-def test_a_flow_must_do_work_and_not_lose_so_many_that_anything_would_do(share, n, word):
+def test_a_flow_must_do_work_and_not_lose_so_many_that_anything_would_do(share, outcome, n, word):
     with pytest.raises(AssertionError, match=word):
-        check_work_identity(lost(share), load("breathing-circle"), n_particles=n, kT=100.0)
+        check_work_identity(lost(share, outcome), load("breathing-circle"), n_particles=n, kT=100.0)
 
 
 def carried(scene, states, t_end):

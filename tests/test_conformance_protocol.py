@@ -28,6 +28,7 @@ from support.edges import EDGES, LATE_EDGES, REST, is_among
 from support.faults import FAULTS, HARMLESS
 from support.faulty_readers import refusing_lines
 from support.faulty_steppers import answers_to, faulty
+from support.runnable import runnable
 from support.schemas import validator
 from test_conformance_suite import made_up
 
@@ -62,7 +63,6 @@ KITS = ("C++, next hit", "Python, implicit domain", "Python, intersection and re
 LANGUAGES = ("Python", "C", "JavaScript", *KITS)
 # One vector in so many, to save time; `mushrooms check` grades them with all.
 EVERY = {"Python": 16, "C": 12, "JavaScript": 6, **dict(zip(KITS, (6, 24, 16), strict=True))}
-STRICT = ("-O1", "-Wall", "-Wextra", "-Werror")
 
 
 @pytest.fixture(scope="module")
@@ -70,15 +70,7 @@ def commands(tmp_path_factory) -> dict[str, Example]:
     """Return each program's command, or why it cannot run here."""
     folder = tmp_path_factory.mktemp("built")
     ours = {f"python -m {name}": Example((sys.executable, "-m", name), "") for name in SERVERS}
-    return ours | find_examples(folder, STRICT) | find_kit_examples(folder, STRICT)
-
-
-def runnable(example: Example) -> list[str]:
-    # A source that does not compile is a failure; a compiler that is absent is not.
-    if example.is_absent:
-        pytest.skip(example.why_not)
-    assert example.command, example.why_not
-    return list(example.command)
+    return ours | find_examples(folder, ["-O1"]) | find_kit_examples(folder, ["-O1"])
 
 
 @pytest.fixture
@@ -270,6 +262,15 @@ def test_the_runner_reads_every_line_or_says_wrong_format(tally):
     assert min(tally["wrong-format"], tally["pass"], tally["fail"]) > N_LINES / 20
 
 
+def test_a_hundred_names_are_kept_of_what_an_introduction_lists():
+    """A list without end would fill every report."""
+    lists = {name: [f"{name} {i}" for i in range(150)] for name in ("profiles", "tables", "laws")}
+    said = {"protocol": 1, "name": "a", "version": "1", "language": "C", **lists}
+    found = session.read_introduction(json.dumps(said).encode())
+    for name, given in lists.items():
+        assert getattr(found, name) == tuple(given[:100])
+
+
 def nonsense(draw, share):
     """Return what answers lines as the fast stepper does, but for a share of nonsense of the right seq."""
 
@@ -442,7 +443,9 @@ def test_every_rule_has_its_faulty_server():
 @pytest.mark.parametrize("name", deep_but(HARMLESS, "names no walls and keeps no flight times"))
 def test_what_is_no_fault_holds_the_checks(name):
     groups, fault = HARMLESS[name]
-    for check in [check for check in UNTIMED if check.name.startswith(groups)]:
+    concerned = [check for check in UNTIMED if check.name.startswith(groups)]
+    assert concerned
+    for check in concerned:
         found = verdict_on(faulty(fault), check.name)
         assert found.verdict in ("pass", "unsupported"), (check.name, found.why)
 

@@ -10,6 +10,7 @@ import pytest
 from support.depth import deep_but
 from support.faulty_steppers import answers_to
 from support.refusals import assert_refused
+from support.runnable import runnable
 
 from conformance import plain, vectors
 from conformance.harness.examples import FOLDER, compiled, find_examples
@@ -95,15 +96,12 @@ def graded(sheet, tmp_path, content: bytes, name: str = "answers.jsonl"):
 
 
 def test_what_comes_back_has_the_verdict_of_a_dialogue(sheet, tmp_path, tally):
-    example = find_examples(tmp_path)["C"]
-    if example.is_absent:
-        pytest.skip(example.why_not)
-    command = example.command
+    command = runnable(find_examples(tmp_path)["C"])
     questions = b"\n".join(sheet.lines())
     done = subprocess.run(command, input=questions, capture_output=True, check=True)
     run = graded(sheet, tmp_path, done.stdout)
     chosen = [*sorted({v.group for v in sheet.chosen}), "fresh", "property"]
-    there = suite.check(list(command), seed=SEED, groups=chosen, limits=Limits(timeout=60.0))
+    there = suite.check(command, seed=SEED, groups=chosen, limits=Limits(timeout=60.0))
     verdicts = {result.id: result.verdict for result in there.results}
     partly = {name for name, profiles in sheets.CHECKS.items() if len(profiles) < 3}
     same = {r.id: r.verdict for r in run.results if r.id in verdicts and r.id not in partly}
@@ -116,12 +114,9 @@ def test_what_comes_back_has_the_verdict_of_a_dialogue(sheet, tmp_path, tally):
 
 
 def test_the_example_in_fortran_is_accepted_for_caps(sheet, tmp_path):
-    built = compiled("Fortran", ["-O2"], FOLDER / "fortran" / "caps.f90", tmp_path / "caps")
-    if built.is_absent:
-        pytest.skip(built.why_not)
-    assert built.command, built.why_not
+    command = runnable(compiled("Fortran", ["-O2"], FOLDER / "fortran" / "caps.f90", tmp_path / "caps"))
     sheets.write_tables(sheet, tmp_path)
-    done = subprocess.run(built.command, cwd=tmp_path, capture_output=True, check=True)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
     run = graded(sheet, tmp_path, done.stdout, "answers.csv")
     assert run.objections() == []
     assert (run.scope().tables, run.scope().profiles) == (["cap"], ["step", "trajectory"])
@@ -198,6 +193,12 @@ BAD_ANSWERS = {
     "bad hex": ("a.csv", HEADER + ROW.replace("1,1\n", "1,0xzz\n"), "vy = '0xzz', must be a finite number"),
     "seq no whole": ("a.csv", HEADER + ROW.replace("1,coll", "1.5,coll"), "seq = '1.5', must be a whole"),
     "torn": ("a.csv", HEADER + ROW + ROW.replace("1,coll", "2,coll") + ROW, "seq = 1 is answered twice"),
+    "semicolons": (
+        "a.csv",
+        HEADER.replace(",", ";"),
+        "columns are separated by semicolons, must be by commas",
+    ),
+    "tabs": ("a.csv", HEADER.replace(",", "\t"), "columns are separated by tabs"),
     "no utf-8": ("a.csv", b"\xff\xfe", "it is no UTF-8"),
     "no file": ("missing.jsonl", None, "No such file"),
 }
@@ -214,7 +215,7 @@ def test_bad_answers_are_refused_in_one_line(name, tmp_path, command_line):
 def test_the_command_writes_questions_and_grades_answers(tmp_path, command_line):
     questions, answers = tmp_path / "q.jsonl", tmp_path / "a.jsonl"
     code, out, err = command_line("check", "--questions", questions, "--seed", 7)
-    assert (code, err) == (0, "")
+    assert (code, err) == (0, "drawing and proving the questions of seed 7: some 20 seconds\n")
     answers.write_bytes(answered(questions.read_bytes()))
     for options in (("--questions", questions), ()):
         code, out, err = command_line("check", *options, "--answers", answers)

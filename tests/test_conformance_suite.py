@@ -4,7 +4,7 @@ import json
 import math
 import re
 import secrets
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -17,9 +17,11 @@ from support.faulty_servers import FAULTS, HONEST, command
 from support.faulty_steppers import clock, faulty
 from support.schemas import validator
 
+import scene as scenes
 from conformance import vectors
 from conformance.mutants.kill_matrix import diagnose
 from conformance.suite import reports, run as suite
+from conformance.suite.checks import form
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import VERDICTS, Result, Run
 from conformance.suite.run import Transform
@@ -103,8 +105,8 @@ MET = {
     "split-line": (STEP, "wrong-format", "line"),
     "junk": (STEP, "wrong-format", "debug: stepping"),
     "blank-line": (STEP, "wrong-format", "''"),
-    "not-utf8": (STEP, "wrong-format", "utf-8"),
-    "not-utf8-in-a-further-field": (STEP, "wrong-format", "utf-8"),
+    "not-utf8": (STEP, "wrong-format", "can't decode byte 0xff"),
+    "not-utf8-in-a-further-field": (STEP, "wrong-format", "can't decode byte 0xe9"),
     "deep-nesting": (STEP, "wrong-format", "[[["),
     "nan": (STEP, "wrong-format", "JSON"),
     "infinity": (STEP, "wrong-format", "out of range"),
@@ -205,6 +207,14 @@ BESIDE = {
     "time": b'"ns":[1],"steps":[]',
 }
 LOST = b'{"seq":1,"states":[{"outcome":"%b","reason":"corner","captured":[1,2]}]}'
+# A reader that replaces, drops or passes what is no UTF-8 finds an answer in each.
+NO_UTF8 = (
+    b'{"seq":1,"outcome":"rejected","reason":"\xff"}',
+    b'{"seq":1,"outcome":"reje\xffcted","reason":"r"}',
+    b'{"seq":1,"error":"no","not\xe9":1}',
+    b'{"seq":1,"error":"no","a surrogate":"\xed\xa0\x80"}',
+    b'{"seq":1,"error":"no","a slash in two bytes":"\xc0\xaf"}',
+)
 
 
 @pytest.mark.parametrize(
@@ -238,7 +248,22 @@ LOST = b'{"seq":1,"states":[{"outcome":"%b","reason":"corner","captured":[1,2]}]
             "trajectory",
             "Field `reason` stands twice",
         ),
+        # A field that the protocol does not name may stand once, wherever it is, and however it is spelt.
+        *(
+            (b'{"seq":1,%b,"error":"no"}' % further, cmd, "Field `n` stands twice")
+            for cmd in BESIDE
+            for further in (
+                b'"n":1,"n":1',
+                b'"n":1,"n":2',
+                b'"n":1,"\\u006e":1',
+                b'"m":{"n":1,"n":2}',
+                b'"m":[[{"n":1,"o":0,"n":1}]]',
+            )
+        ),
+        (b'{"seq":1,"error":"no","a\\u001bb":1,"a\\u001bb":1}', "step", "stands twice"),
         *((LOST % kind, "flow", "null") for kind in (b"rejected", b"undefined", b"undecided")),
+        *((line, "step", "can't decode byte 0x") for line in NO_UTF8),
+        *(('{"seq":1,"error":"no"}'.encode(name), "step", "malformed") for name in ("utf-8-sig", "utf-16")),
     ],
 )
 def test_misshapen_answers_are_named(line, cmd, word):
@@ -256,7 +281,7 @@ REFUSAL = {"outcome": "rejected", "reason": "r"}
         *((b'{"seq":1,"error":"no",%b}' % rest, cmd, {"error": "no"}) for cmd, rest in BESIDE.items()),
         *((b'{"seq":1,"error":null,%b}' % BESIDE["step"], cmd, REFUSAL) for cmd in BESIDE),
         (b'{"seq":1,"steps":[]}', "trajectory", {"steps": ()}),
-        (b'{"seq":1,"error":"no","n":{"a":1,"a":2},"n":%b}' % (b"9" * 10**4), "step", {"error": "no"}),
+        (b'{"seq":1,"error":"no","n":{"a":1,"b":2},"m":%b}' % (b"9" * 10**4), "step", {"error": "no"}),
         (b'{"seq":1.0,"error":"no"}', "step", {"error": "no"}),
         (b'{"seq":1e0,"ns":[41e3,2.0],"steps":[]}', "time", {"ns": (41000, 2), "steps": ()}),
         (b'{"seq":1,"states":[{"outcome":"rejected","reason":"r"}]}', "flow", {"states": (REFUSAL,)}),
@@ -323,6 +348,31 @@ def of_one_seed(name: str, verdict: str, seed: int) -> Run:
     return made(results=[known, Result("a/1", "a", "pass", level="core")])
 
 
+def known_in(run: Run, *names: str) -> Run:
+    """Return a run with a list of what is known to fail."""
+    return msgspec.structs.replace(run, known=frozenset(names))
+
+
+def of_a_check(n_undecided: int, n_answers: int, *, is_known: bool = False) -> Run:
+    """Return a run of some vectors that pass, and a check of so many answers."""
+    check = Result(
+        "promise/hits",
+        "promise",
+        "declined" if n_undecided > 3 else "pass",
+        is_known=is_known,
+        n_answers=n_answers,
+        n_undecided=n_undecided,
+    )
+    return made(results=[Result("a/1", "a", "pass", level="core"), check])
+
+
+MUCH = of_groups(
+    (2, "three", "core", "pass"),
+    (2, "one", "core", "pass"),
+    (8, "one", "core", "declined"),
+    (2, "two", "core", "pass"),
+    (8, "two", "core", "declined"),
+)
 UNASKED = "not asked: restarted 10 times"
 EASY = 4, "a", "core", "pass"
 PASSES = "passes, though it is listed as a known failure"
@@ -339,9 +389,10 @@ PASSES = "passes, though it is listed as a known failure"
         (made("pass", "indeterminate", "fail"), ["fail"], 1),
         (made("unsupported", "unsupported"), ["no vector passed"], 1),
         (made(), ["no vector passed"], 1),
-        (made("declined", "declined"), ["declined 2 of 2 cases"], 1),
+        (made("declined", "declined"), ["declined 2 of 2 vectors"], 1),
+        (made(*["declined"] * 6), ["declined 6 of 6 vectors and fresh questions"], 1),
         (made(*["pass"] * 19, "declined"), [], 0),
-        (made(*["pass"] * 18, "declined"), ["declined 1 of 19"], 1),
+        (made(*["pass"] * 18, "declined"), [], 0),
         (made("pass", "fail", listed=(1,)), [], 0),
         (made("pass", "crashed", listed=(1,)), [], 0),
         (made("pass", "pass", listed=(1,)), [f"made-up/1: {PASSES}"], 1),
@@ -353,16 +404,24 @@ PASSES = "passes, though it is listed as a known failure"
         ),
         # At level stress a group may be declined, but not all that is asked.
         (of_groups((60, "a", "core", "pass"), (3, "b", "stress", "declined")), [], 0),
-        (of_groups((60, "a", "core", "pass"), (4, "b", "stress", "declined")), ["declined 4 of 64 cases"], 1),
-        (of_groups(EASY, (3, "a", "core", "declined"), (90, "b", "stress", "pass")), ["in group a"], 1),
+        (of_groups((60, "a", "core", "pass"), (4, "b", "stress", "declined")), [], 0),
+        (of_groups((60, "a", "core", "pass"), (12, "b", "stress", "declined")), ["declined 12 of 72"], 1),
+        (of_groups(EASY, (3, "a", "core", "declined"), (90, "b", "stress", "pass")), [], 0),
+        (of_groups(EASY, (9, "a", "core", "declined"), (300, "b", "stress", "pass")), ["in group a"], 1),
         # What is declined too often can be known.
-        (made("pass", "declined", "declined"), ["declined 2 of 3 cases"], 1),
-        (made("pass", "declined", "declined", known=frozenset({"declined/all"})), [], 0),
+        (MUCH, ["declined 16 of 22 vectors", "in group one", "in group two"], 1),
+        (known_in(MUCH, "declined/all", "declined/one", "declined/two"), [], 0),
         (
-            made("pass", "declined", "declined", known=frozenset({"declined/all", "declined/protocol"})),
-            ["declined/protocol: less is declined, though it is listed as a known failure"],
+            known_in(MUCH, "declined/all", "declined/one", "declined/two", "declined/three"),
+            ["declined/three: less is declined, though it is listed as a known failure"],
             1,
         ),
+        # A check has its own answers, and can be known by its own name.
+        (of_a_check(3, 3), [], 0),
+        (of_a_check(4, 4), ["promise/hits: 4 of 4 answers are undecided: surely more than 25%"], 1),
+        (of_a_check(12, 32), [], 0),
+        (of_a_check(5, 5, is_known=True), [], 0),
+        (of_a_check(0, 5, is_known=True), [f"promise/hits: {PASSES}"], 1),
         # A list made with one seed holds with another: it is strict within a seed.
         (of_one_seed("fresh/2@1", "fail", 1), [], 0),
         (of_one_seed("fresh/2@1", "pass", 1), [PASSES], 1),
@@ -492,3 +551,47 @@ def test_known_failures_are_marked_in_a_run(monkeypatch):
     fixed = frozenset({"made-up/0", "made-up/1", "protocol/stop"})
     run = suite.check(command("crash-at-second"), known=fixed)
     assert run.objections() == ["made-up/0: passes, though it is listed as a known failure"]
+
+
+FLYING, MET = State(0.0, 0.0, 0.5, 0.0, 1.0), {"outcome": "collision", "wall": "arc", "dt": 0.5}
+ENDS = {
+    "collision": [MET | {"t": 0.5 * (k + 1), "x": 0.0, "y": 1.0, "vx": 0.0, "vy": -1.0} for k in range(9)],
+    "horizon": [{"outcome": "horizon", "t": 9.0, "x": 0.0, "y": 0.5, "vx": 0.0, "vy": 1.0}] * 9,
+    "undefined": [{"outcome": "undefined", "reason": "corner"}] * 9,
+}
+
+
+@pytest.mark.parametrize("n", [0, 1, 3])
+@pytest.mark.parametrize("hits", [0, 2, 9])
+@pytest.mark.parametrize("end", ["horizon", "undefined"])
+def test_a_path_is_asked_step_by_step_until_it_ends(n, hits, end):
+    """Nothing is asked after what is no collision, and no more than is wanted."""
+    answers = [*ENDS["collision"][:hits], *ENDS[end]]
+    asked = []
+
+    def ask(request):
+        asked.append(request["state"])
+        return answers[len(asked) - 1]
+
+    stepper = form.Implementation(SimpleNamespace(ask=ask), "step")
+    found = stepper.path(scenes.Cap(r=1.0), FLYING, n, 9.0)
+    assert len(asked) == len(found) == min(n, hits + 1)
+    kinds = [type(one).__name__.lower() for one in found]
+    assert kinds == (["collision"] * hits + [end])[:n]
+    assert [state["t"] for state in asked] == [0.5 * k for k in range(len(asked))]
+
+
+@pytest.mark.parametrize(
+    ("n", "steps", "is_right"),
+    [
+        (2, ENDS["collision"][:2], True), (2, [*ENDS["collision"][:1], ENDS["horizon"][0]], True),
+        (2, ENDS["collision"][:1], False), (2, ENDS["collision"][:3], False), (2, [], False),
+        (3, [ENDS["horizon"][0], *ENDS["collision"][:1]], False), (0, [], True),
+        (3, [*ENDS["collision"][:1], ENDS["horizon"][0], ENDS["horizon"][0]], False),
+    ],
+)  # fmt: skip
+def test_a_trajectory_of_too_many_or_too_few_steps_is_seen(n, steps, is_right):
+    session = SimpleNamespace(ask=lambda _: {"steps": steps})
+    stepper = form.Implementation(session, "trajectory")
+    with nullcontext() if is_right else pytest.raises(CheckFailure, match=f"{len(steps)} steps, "):
+        assert len(stepper.path(scenes.Cap(r=1.0), FLYING, n, 9.0)) == len(steps)

@@ -4,10 +4,12 @@ import doctest
 import importlib
 import importlib.util
 import json
+import math
 import os
 import pkgutil
 import re
 import shlex
+import socket
 import subprocess
 import sys
 import tomllib
@@ -25,15 +27,16 @@ from support.schemas import MODULES, validator
 
 import fast
 import theory
-from conformance import plain, vectors
+from conformance import plain
 from conformance.cases.generated import ROUND
 from conformance.cases.table import FAMILIES
 from conformance.mutants import MUTANTS
 from conformance.suite.checks.flows import MAX_STATES
-from conformance.suite.checks.paths import MAX_HITS, MAX_WAIT
+from conformance.suite.checks.paths import MAX_HITS, MAX_LATE, MAX_WAIT, NEAREST, STEEPEST
 from conformance.suite.checks.requests import MOST_SAMPLES
+from conformance.suite.result import MAX_DECLINED_OF_PART, VERDICTS, declines_too_much
 from conformance.suite.session import read_answer
-from docs import pictures
+from docs import figures, pictures
 from fast.kernel.fates import MOST_TO_A_TIME
 from fast.kernel.follow import LANE_ROWS
 from fast.validation import MAX_CYCLES, MOST_IN_CYCLES
@@ -53,7 +56,7 @@ ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # Changes that the tutorial asks its reader to make, by the number of the console block that they precede.
-EDITS = {2: ("box.py", "2 * rate", "1 * rate"), 3: ("box.py", "1 * rate", "2 * rate")}
+EDITS = {2: ("box.py", "2 * rate", "1 * rate"), 4: ("box.py", "1 * rate", "2 * rate")}
 
 
 def fences(document: str) -> list[tuple[str, str]]:
@@ -106,14 +109,17 @@ def test_the_tutorial_does_what_it_says(tmp_path):
 @pytest.mark.deep
 @pytest.mark.parametrize("name", ["one-node.sh", "energies.sh", "several-nodes.sh"])
 def test_the_scripts_for_a_cluster_run(tmp_path, name):
-    """With few particles, another port, and functions in place of SLURM's commands."""
+    """With few particles, a free port, and functions in place of SLURM's commands."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
     script = re.sub(r"--particles \S+", "--particles 64", dict(blocks("clusters.md", "bash"))[name])
     job = {"SLURM_CPUS_PER_TASK": "1", "SLURM_ARRAY_TASK_ID": "0", "SLURM_JOB_ID": "7"}
     done = subprocess.run(
         [
             "bash",
             "-c",
-            'srun() { "$@"; }; hostname() { echo 127.0.0.1; }\n' + script.replace("8786", "18786"),
+            'srun() { "$@"; }; hostname() { echo 127.0.0.1; }\n' + script.replace("8786", str(port)),
         ],
         env={**os.environ, **job, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"},
         cwd=tmp_path,
@@ -144,17 +150,28 @@ def test_another_output_would_be_seen():
     assert not matches("a\n...\nb", "b\na\n")
 
 
-def test_the_figures_of_the_corpus_are_right():
-    text = " ".join((DOCS / "corpus.md").read_text("utf-8").split())
-    corpus = vectors.load("stress")
-    kinds = Counter(vector.kind for vector in corpus)
-    levels = Counter(vector.level for vector in corpus)
-    assert (
-        f"Corpus {vectors.manifest().corpus} holds {kinds['step']:,} steps, {kinds['trajectory']}"
-        f" trajectories and {kinds['flow']} flows" in text
-    )
-    shown = "{core:,} of them at level core, {extended} at extended, {stress} at stress".format(**levels)
-    assert shown in text
+@pytest.mark.parametrize(
+    "page", sorted({path for path in DOCS.glob("*.md") if "<!-- figures" in path.read_text()})
+)
+def test_the_numbers_of_a_page_are_those_of_its_command(page):
+    """If this fails, `python -m docs.figures` writes them anew."""
+    text = page.read_text("utf-8")
+    assert figures.refreshed(text) == text
+
+
+def test_every_region_of_numbers_is_on_a_page():
+    marked = [
+        name for page in DOCS.glob("*.md") for _, name, *_ in figures.REGION.findall(page.read_text("utf-8"))
+    ]
+    assert sorted(marked) == sorted(figures.REGIONS)
+
+
+def test_a_number_that_is_out_of_date_is_replaced():
+    stale = (DOCS / "speed.md").read_text("utf-8").replace("| fast, lanes | 12 |", "| fast, lanes | 11 |")
+    assert "| fast, lanes | 12 |" in figures.refreshed(stale)
+
+
+def test_the_vector_of_the_corpus_page_is_published():
     [(name, example)] = blocks("corpus.md", "json")
     published = ROOT / "conformance" / "corpus" / f"{name.split('/')[0]}.jsonl"
     assert json.loads(example) in map(json.loads, published.read_text("utf-8").splitlines())
@@ -264,7 +281,7 @@ def test_what_a_page_names_exists(page):
 
 def test_every_page_is_named_by_another():
     """The contents of the site do not count: who reads on does not look there."""
-    aside = {DOCS / name for name in ("index.md", "changelog.md", "contributing.md")}
+    aside = {DOCS / name for name in ("index.md", "changelog.md", "contributing.md", "equations.md")}
     links = {
         (page.parent / link).resolve()
         for page in PAGES
@@ -340,7 +357,7 @@ RUN_ELSEWHERE = {
     "corpus.md": {"json"},  # the published line
     "cite.md": {"bibtex"},  # test_house_package
     "clusters.md": {"bash"},  # with few particles
-    "audit.md": {""},  # test_mushrooms_audit: the commands, and the runs that they make taken up
+    "audit.md": {"", "none"},  # test_mushrooms_audit: the commands, and the runs that they make; a region
     "ensembles.md": {"", "python"},  # test_mushrooms_simulate, with fewer particles
 }
 INSTALLS = ("pip install", "mushrooms --version", "git clone", "cd oscillating-mushrooms")
@@ -392,6 +409,7 @@ def test_the_python_of_a_page_does_what_it_says(name):
 @pytest.mark.parametrize("name", deep_but(["start.md", "your-scene.md", "scenes.md"], "scenes.md"))
 def test_the_commands_of_a_page_do_what_they_say(command_line, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
+    assert "console" in {first for first, _ in fences(name)}
     for first, text in fences(name):
         kind, _, file = first.partition(" ")
         if kind == "toml":
@@ -411,14 +429,24 @@ def test_the_commands_of_a_page_do_what_they_say(command_line, tmp_path, monkeyp
 @pytest.mark.deep
 def test_the_pictures_of_the_pages_are_made(tmp_path):
     """All of them, by the code that stands above each; a page shows every picture that it makes."""
+    n_made = 0
     for page in DOCS.glob("*.md"):
-        shown = re.findall(r"\]\(generated/([^)]+)\)", page.read_text("utf-8"))
+        shown = re.findall(r"\]\(gallery/([^)]+)\)", page.read_text("utf-8"))
         pictures.draw(page, tmp_path)
         made = [name for name, _ in pictures.blocks(page)]
+        n_made += len(made)
         assert sorted(made) == sorted(shown)
         for name in made:
             start = {".svg": b"<?xml", ".png": b"\x89PNG", ".gif": b"GIF89a"}[Path(name).suffix]
             assert (tmp_path / name).read_bytes().startswith(start)
+    assert n_made > 10
+
+
+def test_the_repository_holds_the_pictures_of_its_pages():
+    """If this fails, `python -m docs.pictures` makes them anew."""
+    assert json.loads((pictures.GALLERY / "blocks.json").read_bytes()) == pictures.digests()
+    made = {name for page in DOCS.glob("*.md") for name, _ in pictures.blocks(page)}
+    assert {path.name for path in pictures.GALLERY.iterdir()} == made | {"blocks.json"}
 
 
 def test_a_block_that_fails_is_not_passed_over(tmp_path):
@@ -488,10 +516,44 @@ def row_of_losses(name: str, label: str) -> str:
     return f"| {label} | {' | '.join(f'{number:.4f}'[1:] for number in numbers)} |"
 
 
-def lines_of_growth() -> str:
-    all_kept = BENCH["growth"]["collisions"]
-    lasts = BENCH["growth"]["lasts"].items()
-    return " ".join(f"- {name}: {'over ' * (n >= all_kept)}{n:.0f}" for name, n in lasts)
+def words_of_rare_errors() -> str:
+    (grazing,) = [p for p in BENCH["points"] if (p["solver"], p["workload"]) == ("lean C", "grazing")]
+    n = BENCH["questions"] + grazing["further"]
+    wrong = grazing["wrong"] + grazing["astray"]
+    return (
+        f"all these questions but {wrong}. These {wrong} flights leave the arc almost tangentially"
+        f" (workload `grazing`, {n:,} questions)"
+    )
+
+
+def words_of_declining() -> str:
+    """Find how few of some answers are too many."""
+    least = [
+        f"{next(k for k in range(n + 1) if declines_too_much(k, n, MAX_DECLINED_OF_PART))} of {n}"
+        for n in (4, 20, 50)
+    ]
+    assert not declines_too_much(3, 3, MAX_DECLINED_OF_PART)
+    return (
+        f"So {least[0]}, {least[1]} or {least[2]} answers are more than {MAX_DECLINED_OF_PART:.0%}".replace(
+            "%", " %"
+        )
+    )
+
+
+def words_of_a_finite_energy() -> str:
+    scene = load("fixed-cap-anticlockwise")
+    limit, there = float(theory.predict(scene, 6).m1), theory.at_energy(scene, 1e5).mean_s
+    return f"for `fixed-cap-anticlockwise` m1 is {limit:.4f} in the limit, and {there:.4f} at energy 1e5"
+
+
+def words_of_the_retraced_arc() -> str:
+    scene = load("retraced-arc")
+    found = theory.predict(scene, 6).strings(6)
+    there = theory.at_energy(scene, 1e6).mean_s
+    return (
+        f"m1 = {found['m1']}, p_nc = {found['p_nc']} and s_nc = 0. A simulation at energy 1e6 gave"
+        f" mean s = 0.0546 +- 0.0019. The prediction for that energy is {there:.4f}."
+    )
 
 
 def size_of_the_audit() -> str:
@@ -558,7 +620,25 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "blocks": ("docs/ensembles.md", lambda: f"by default {conduct.LEAST_BLOCK} to {conduct.MOST_BLOCK},"),
     "fill values": ("docs/ensembles.md", words_of_whole_arrays),
     **{f"fast.{name}": ("docs/api/fast.md", partial("fast.{} ".format, name)) for name in fast.__all__},
-    "growth": ("docs/speed.md", lines_of_growth),
+    "digits of a path": (
+        "docs/limits.md",
+        lambda: f"after about {BENCH['growth']['lasts']['binary64 (plain Python)']:.0f} collisions",
+    ),
+    "rare errors": ("docs/speed.md", words_of_rare_errors),
+    "digits lost": (
+        "docs/speed.md",
+        lambda: f"energy 1e4, {BENCH['growth']['rate']:.2f} correct decimal digits are lost per",
+    ),
+    "late starts": ("docs/detection.md", lambda: f"periods from t = 0 | 1 | 2^{MAX_LATE.bit_length() - 1}"),
+    "distances": ("docs/detection.md", lambda: f"or 1 - w / r | 2^{math.log2(NEAREST):.0f} | 2^-2"),
+    "slopes": ("docs/detection.md", lambda: f"either sign | 2^-24 | 2^{math.log2(STEEPEST):.0f}"),
+    "limits of declining": ("docs/protocol.md", words_of_declining),
+    "verdicts": (
+        "docs/glossary.md",
+        lambda: f"gives each case one of {({9: 'nine'})[len(VERDICTS)]} verdicts",
+    ),
+    "limit of m1": ("docs/start.md", words_of_a_finite_energy),
+    "retraced arc": ("theory/equations.md", words_of_the_retraced_arc),
     **{
         name: ("theory/equations.md", partial(row_of_losses, name, label))
         for name, label in {

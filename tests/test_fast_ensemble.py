@@ -287,3 +287,18 @@ def test_captures_come_when_theory_says():
     s = np.log(run.energy / run.energy0)
     error = np.std(np.exp(-s / 2)) / math.sqrt(n)
     assert abs(np.mean(np.exp(-s / 2)) - float(theory.unbiased_mean(scene))) < 4 * error
+
+
+@pytest.mark.parametrize(
+    ("phases", "shown"),
+    [
+        ((0.5, 0.2), "(0.5, 0.2)"),
+        ([0.5, 0.5], "(0.5, 0.5)"),
+        (np.array([1.5]), "(1.5,)"),
+        ([0.9] * 8, "(0.9, 0.9, 0.9, 0.9, 0.9, 0.9, ...)"),
+    ],
+)
+def test_refused_phases_are_shown_with_their_values(phases, shown):
+    with pytest.raises(BadInput) as refusal:
+        fast.simulate(load("moving-cap"), n_particles=2, energy=10.0, phases=phases)
+    assert str(refusal.value) == f"phases = {shown}, must rise and lie in (0, 1)"

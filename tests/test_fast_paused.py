@@ -146,6 +146,59 @@ def test_another_run_is_refused(changes, words):
         fast.go_on(**{**asked, "n_cycles": 3, **changes}, before=two)
 
 
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"n_particles": 3}, r"before: lanes has the shape \(1, (\d+)\), must have \(3, \1\)"),
+        ({"energy": 11.0}, "before: energy = 10.0, must be 11.0"),
+        ({"phases": (0.25, 0.5)}, r"before: ensemble.phase_energies has the shape \(1, 2, 1\)"),
+        ({"phases": ()}, r"before: ensemble.phase_energies has the shape \(1, 2, 1\)"),
+        ({"scene": SCENES["two narrowings"]}, r"before: ensemble.t_in has the shape \(1, 2, 1\), must have"),
+    ],
+)
+def test_a_run_rebuilt_without_its_arguments_is_refused_by_its_arrays(changes, words):
+    """Numpy would repeat the state of a single particle for all."""
+    asked = {"scene": SCENES["moving cap"], "n_particles": 1, "energy": 10.0, "phases": (0.5,)}
+    two = fast.go_on(n_cycles=2, **asked)._replace(asked=None)
+    with pytest.raises(BadInput, match=words):
+        fast.go_on(**{**asked, "n_cycles": 3, **changes}, before=two)
+
+
+@pytest.mark.parametrize(
+    ("part", "spoilt"),
+    [
+        ("lanes", lambda lanes: lanes[:, 1:]),
+        ("lanes", lambda lanes: lanes[0]),
+        ("lanes", lambda lanes: lanes.tolist()),
+        ("asked", lambda asked: "moving-cap"),
+        ("t_out", lambda t_out: t_out[:, :1]),
+        ("t_in", lambda t_in: t_in[..., 0]),
+        ("cycle_energies", lambda energies: energies[0]),
+        ("phase_captured", lambda captured: captured[:1]),
+        ("phase_energies", lambda energies: np.repeat(energies, 2, axis=2)),
+    ],
+)
+def test_a_run_with_an_array_of_another_shape_is_refused(part, spoilt):
+    asked = {"n_particles": 2, "energy": 10.0, "phases": (0.5,)}
+    two = fast.go_on(SCENES["moving cap"], n_cycles=2, **asked)
+    if part in ("lanes", "asked"):
+        other = two._replace(**{part: spoilt(getattr(two, part))})
+    else:
+        found = {part: spoilt(getattr(two.ensemble, part))}
+        other = two._replace(ensemble=two.ensemble._replace(**found))
+    with pytest.raises(BadInput, match=f"before[: ].*({part} has the shape|what go_on has returned)"):
+        fast.go_on(SCENES["moving cap"], n_cycles=3, **asked, before=other)
+
+
+@pytest.mark.parametrize("kind", [float, np.float64, np.int32, np.uint64])
+def test_whole_numbers_of_another_kind_are_taken(kind):
+    asked = {"n_particles": 2, "energy": 10, "n_cycles": 1, "seed": 3, "first": 4, "threads": 1}
+    given = {name: kind(value) for name, value in asked.items()}
+    one = fast.go_on(SCENES["moving cap"], **given)
+    wanted = fast.go_on(SCENES["moving cap"], **asked | {"n_cycles": 2})
+    assert is_same(fast.go_on(SCENES["moving cap"], **given | {"n_cycles": kind(2)}, before=one), wanted)
+
+
 def test_what_a_run_was_asked_for_is_kept_with_it_but_for_its_name():
     scene, asked = SCENES["moving cap"], {"n_particles": 4, "energy": 10.0}
     two = fast.go_on(scene, n_cycles=2, phases=(0.5,), **asked)

@@ -164,6 +164,16 @@ def test_the_citation_is_of_this_version():
     )
 
 
+def test_ci_runs_the_two_commands_that_the_readme_gives():
+    readme = (ROOT / "README.md").read_text("utf-8")
+    commands = re.findall(r"^(pip install .*) && (.*)$", readme, re.MULTILINE)
+    assert commands == [("pip install -e .", "mushrooms audit"), ("pip install -e '.[test]'", "pytest")]
+    script = (ROOT / ".ci" / "run").read_text("utf-8")
+    for install, then in commands:
+        (line,) = [line for line in script.splitlines() if f"{{ {install} && " in line]
+        assert re.search(rf" {then}( |\))", line)
+
+
 @pytest.mark.parametrize("name", ["ci.yml", "release.yml"])
 def test_what_the_workflows_run_exists(name):
     text = (ROOT / ".github" / "workflows" / name).read_text("utf-8")

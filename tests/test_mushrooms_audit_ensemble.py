@@ -9,6 +9,7 @@ import zarr
 from pyarrow import parquet
 from support import practice_engine
 from support.depth import deep_among
+from support.refusals import assert_refused
 
 import scene as scenes
 import theory
@@ -94,6 +95,16 @@ def test_a_seeded_sample_of_theory_passes_in_other_units_and_forms(tmp_path, rig
         same, _ = audit_ensemble.read(tmp_path / form, SCENE, PLAIN)
         assert np.array_equal(same.s, here.s)
         assert np.array_equal(same.t_out, here.t_out, equal_nan=True)
+
+
+def test_a_parquet_column_that_stands_twice_is_refused_by_name(tmp_path, command_line):
+    energies = pyarrow.array([1e4, 2e4])
+    table = pyarrow.Table.from_arrays([energies] * 3, names=["E0", "E1", "E1"])
+    parquet.write_table(table, tmp_path / "e.parquet")
+    audit = ["audit", "--scene", "moving-cap", "--out", tmp_path / "report", "--ensemble"]
+    ended = command_line(*audit, tmp_path / "e.parquet")
+    assert_refused(ended, "e.parquet': column 'E1' stands twice")
+    assert not (tmp_path / "report").exists()
 
 
 def test_further_cycles_are_held_to_sums(tmp_path):

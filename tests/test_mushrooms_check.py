@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +10,7 @@ from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import msgspec
+import numpy as np
 import pytest
 from matplotlib.text import Text
 from support.depth import deep_but
@@ -21,11 +21,12 @@ import conformance
 import scene as scenes
 from conformance import plain, vectors
 from conformance.bench import record, workloads
+from conformance.harness.examples import find_compiler
 from conformance.suite import pytest_suite, run as suite
 from conformance.suite.checks import flows
 from conformance.suite.session import Session
 from mushrooms import bench, output
-from mushrooms.reports import bench_page
+from mushrooms.reports import bench_page, check_page
 from scene import State
 
 PYTHON = [sys.executable, str(Path(conformance.__file__).parent / "harness" / "python" / "stepper.py")]
@@ -266,12 +267,59 @@ def test_a_right_trajectory_is_proved_and_a_false_step_is_drawn(tmp_path, comman
     arguments = ("verify", path, "--scene", "moving-cap", "--picture", picture)
     for words in (arguments, ("verify", whole)):
         code, out, _ = command_line(*words)
-        assert (code, out.splitlines()[-1]) == (0, "4 of 4 proved")
+        assert code == 0
+        assert out.splitlines()[-1] == "4 of 4 agree within 9.01e+06 backward ulps, 0 false, 0 open"
     assert not picture.exists()
     path.write_text(as_csv([*states[:2], {**states[2], "x": states[2]["x"] + 0.01}]))
     code, out, _ = command_line(*arguments)
     assert (code, "step 2: false" in out) == (1, True)
-    assert picture.read_text().startswith("<?xml")
+    assert (
+        f"step 2: x = {states[2]['x'] + 0.01:.10g}, must be {states[2]['x']:.10g}: off by 0.01"
+        in picture.read_text()
+    )
+    lines_of_json = tmp_path / "steps.jsonl"
+    rows = [{"scene": scene, "state": states[0]}, *states[1:]]
+    lines_of_json.write_text("\n".join(map(json.dumps, rows)))
+    for options, expected in ((("--all", "--within", "1e6"), 0), (("--within", "0"), 1)):
+        code, out, _ = command_line("verify", lines_of_json, *options)
+        assert (code, " agree within " in out) == (expected, True)
+
+
+def test_a_wall_that_is_missing_from_a_table_is_named(tmp_path, command_line):
+    path = tmp_path / "steps.csv"
+    path.write_text("t,x,y,vx,vy\n0,0.1,0.2,3,4\n1,0,0,0,1\n")
+    code, out, err = command_line("verify", path, "--scene", "moving-cap")
+    assert (code, out, "column 'wall' is missing" in err) == (2, "", True)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("x", lambda x: x + 1e-4, "off by 0.0001"),
+        ("vy", lambda vy: vy * (1 + 1e-4), "vy = "),
+        ("t", lambda t: t * (1 + 1e-4), "t = "),
+        ("wall", lambda wall: "base" if wall == "arc" else "arc", "wall = "),
+    ],
+)
+def test_the_picture_of_a_false_step_shows_what_is_off(name, change, words):
+    """The close-up is as large as the distance, so that two ends are two points."""
+    [truth] = plain.trajectory(scenes.load("moving-cap"), START, 1, 1e9)
+    given = {field: getattr(truth, field) for field in FIELDS}
+    given[name] = change(given[name])
+    figures = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(check_page.plots, "svg", figures.append)
+        check_page.draw_step(scenes.load("moving-cap"), START, truth, given, "step 7")
+    [figure] = figures
+    title = figure.get_suptitle()
+    assert title.startswith(f"step 7: {name} = ")
+    assert words in title
+    if name == "x":
+        left, right = figure.axes[1].get_xlim()
+        assert 2e-4 < right - left < 8e-4
+        assert left < min(truth.x, given["x"]) < max(truth.x, given["x"]) < right
+        points = np.hstack([line.get_data() for line in figure.axes[1].lines if len(line.get_xdata()) > 100])
+        assert np.hypot(points[0] - truth.x, points[1] - truth.y).min() < 2e-5  # the arc goes through the hit
 
 
 ROOT = Path(__file__).parent.parent
@@ -289,7 +337,7 @@ def test_a_benchmark_is_written_whole_and_again(command_line, tmp_path, monkeypa
     names = {p.solver for p in found.points}
     assert {"proof, 200 digits", "fast, lanes", "fast, pairs", "plain Python"} < names
     assert f"command {' '.join(one)}" in names
-    if shutil.which("cc"):
+    if find_compiler("C"):
         assert names >= {"lean C", "steps, flight/10", "steps, flight/100", "steps, flight/1000"}
         assert "baselines.c" in found.machine.compiled["lean C"]
     else:

@@ -1,6 +1,7 @@
 """Pictures: orbits and their exports, the command, ensembles, what heats fastest, typeset formulas."""
 
 import csv
+import io
 import itertools
 import math
 import re
@@ -20,6 +21,7 @@ import fast
 import reference
 import scene as scenes
 import theory
+from docs.pictures import BLOCK
 from mushrooms import lyapunov, orbits
 from mushrooms.figures import energies, orbits as pictures, style, table as tables
 from mushrooms.figures.heating import Loop, fastest, moving_cap, phase_diagram, supremum, switched
@@ -34,7 +36,9 @@ N_COLLISIONS, ENERGY, SEED = 300, 1e5, 3
 
 @pytest.fixture(scope="module")
 def moving():
-    return orbits.follow(MOVING, N_COLLISIONS, energy=ENERGY, seed=SEED, n_orbits=6)
+    followed = orbits.follow(MOVING, N_COLLISIONS, energy=ENERGY, seed=SEED, n_orbits=6)
+    assert len(followed) == 6
+    return followed
 
 
 def whispering(scene: scenes.Scene = STATIC, n: int = N_COLLISIONS) -> orbits.FollowedOrbit:
@@ -44,7 +48,9 @@ def whispering(scene: scenes.Scene = STATIC, n: int = N_COLLISIONS) -> orbits.Fo
 
 def test_an_orbit_is_the_particle_of_the_ensemble(moving):
     ensemble = fast.simulate(MOVING, n_particles=6, energy=10.0, seed=SEED)
-    for i, orbit in enumerate(orbits.follow(MOVING, 1, energy=10.0, seed=SEED, n_orbits=6)):
+    followed = orbits.follow(MOVING, 1, energy=10.0, seed=SEED, n_orbits=6)
+    assert len(followed) == 6
+    for i, orbit in enumerate(followed):
         assert orbit.energies()[0] == pytest.approx(10.0, rel=1e-14)
         whole = fast.trajectory(MOVING, orbit.start, 10**6, math.tau).outcome
         assert isinstance(whole, scenes.Horizon)
@@ -304,7 +310,8 @@ def test_the_command_draws_several_pictures_and_exports(command_line, tmp_path, 
     )  # fmt: skip
     assert code == 0
     assert out.split() == ["orbit.csv", "orbits-section.png", "orbits-map.png"]
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(out.split())
+    written = {path.name for path in tmp_path.iterdir()}
+    assert written == {*out.split(), "orbit.csv-metadata.json"}
     assert len((tmp_path / "orbit.csv").read_text().splitlines()) == 102
 
 
@@ -390,6 +397,81 @@ def test_growth_shows_means_and_theory_of_each_cycle(n_blocks):
     assert np.abs(line.get_ydata()[1:] - gains.mean(axis=0)).max() < 4 * gains.std() / 200**0.5
     assert line.get_ydata()[1] == pytest.approx(theory.at_energy(load("moving-cap"), 1e4).mean_s)
     assert any("theory at this energy" in name for name in labels(right))
+
+
+@pytest.mark.parametrize("energy", [1e4, 1e6])
+def test_all_lines_of_a_panel_are_of_one_energy(energy):
+    """At 1e4 the retraced arc spreads twice as far as in the limit, by which its sd was once drawn."""
+    scene = load("retraced-arc")
+    gains = np.random.default_rng(1).normal(0.1, 0.5, (40, 3))
+    above = energies.growth(scene, energy, gains).axes[0]
+    told = dict(zip(labels(above), above.get_legend_handles_labels()[0], strict=True))
+    [mean] = [line for name, line in told.items() if name.startswith("theory, m1")]
+    dotted = [line for line in above.lines if line.get_linestyle() == ":"]
+    there = theory.at_energy(scene, energy)
+    for edge, sign in zip(dotted, (-1, 1), strict=True):
+        spread = sign * (edge.get_ydata() - mean.get_ydata())
+        assert spread[1] == pytest.approx(there.variance_s**0.5)
+        assert spread[2] < 2**0.5 * spread[1]  # the second cycle is a little faster
+
+
+@pytest.mark.parametrize(
+    ("scene", "energy"), [(OWN, 1e6), (load("retraced-arc"), 1e4), (load("moving-cap"), 1e4)]
+)
+def test_a_curve_of_theory_stays_in_its_frame_and_is_smooth(scene, energy):
+    """The density of the captured has no bound where captures have the greatest gain."""
+    run = fast.simulate(scene, n_particles=2000, energy=energy, seed=1)
+    axes = energies.histogram(scene, energy, np.log(run.energy / energy)[run.takes_part()]).axes[0]
+    [curve] = [line for line in axes.lines if len(line.get_xdata()) > 2]
+    x, y = curve.get_data()
+    low, high = axes.get_ylim()
+    assert low <= y.min()
+    assert y.max() < high
+    bars = axes.patches[0].get_data()
+    middle = (bars.edges[1:] + bars.edges[:-1]) / 2
+    width = bars.edges[1] - bars.edges[0]
+    known = energies.known(scene, energy)
+    if known is not None:  # at steps of a quarter of a bar; 0.06 where single point masses show
+        quarters = np.interp(np.arange(x[0], x[-1], width / 4), x, y)
+        assert np.abs(np.diff(quarters, 2)).max() < 0.02 * y.max()
+    below = theory.energies(scene).captured_below if known is None else known.cdf
+    assert np.interp(middle, x, y) == pytest.approx(np.diff(below(bars.edges)) / width, abs=0.05 * y.max())
+
+
+def test_the_legend_of_a_path_stands_below_its_axes(moving):
+    """Once far below: a table keeps its shape, and the figure what it leaves."""
+    flat = scenes.Stem(w=4.0, h=scenes.Fourier(mean=1.0, cos=(0.1,), omega=1.0))
+    for orbit in (moving[0], orbits.follow(flat, 40, energy=1e3, seed=1)[0]):
+        figure = pictures.trajectory(orbit)
+        figure.draw_without_rendering()
+        axes = figure.axes[0]
+        label, legend = axes.xaxis.label.get_window_extent(), axes.get_legend().get_window_extent()
+        assert 0 < label.y0 - legend.y1 < 0.3 * figure.dpi
+
+
+def test_the_particle_of_the_gallery_is_captured():
+    """The page explains a black line and a shade."""
+    page = (Path(__file__).parent.parent / "docs" / "gallery.md").read_text("utf-8")
+    [code] = [code for name, code in BLOCK.findall(page) if name == "gallery-particle.png"]
+    given = {"moving_cap": MOVING, "orbits": orbits, "pictures": pictures}
+    exec(code, given)
+    shown = given["figure"].axes[0].get_legend_handles_labels()[1]
+    assert shown == ["this particle", "theory with these captures", "theory, never captured", "captured"]
+
+
+def test_a_notebook_is_given_every_figure(moving):
+    """It asks an object for its picture; pyplot is never loaded, which would answer for a plain figure."""
+    ensemble = [energies.histogram(MOVING, 1e4, NINE), energies.growth(MOVING, 1e4, np.ones((9, 2)))]
+    single = [make(moving[0]) for make in (pictures.trajectory, pictures.energy_in_time)]
+    several = [make(moving[:1]) for make in (pictures.section, pictures.collision_map)]
+    for figure in (
+        *ensemble,
+        *single,
+        *several,
+        style.new_figure(1.0, 1.0)[0],
+        tables.new_strip(MOVING, 3.0, 3.0),
+    ):
+        assert Image.open(io.BytesIO(figure._repr_png_())).format == "PNG"
 
 
 PAGE = Path(__file__).parent.parent / "docs" / "heating.md"

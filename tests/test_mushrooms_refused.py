@@ -60,11 +60,20 @@ ENSEMBLES = {
     "E0,E1 nan,2 nan,3": "E0 = nan, must be finite and > 0",
     "E0,E1 1e4,2e4 1e5,2e5": "E0 takes several values, 10000 and 100000 among them",
     "E0,E1,captured 1e4,2e4,2 1e4,2e4,0": "captured = 2.0, must be 0 or 1",
+    "E0;E1 1e4;2e4 1e4;3e4": "its columns are separated by semicolons, must be by commas",
+    "E0|E1 1e4|2e4": "separated by bars",
+    "E0\tE1 1e4\t2e4": "separated by tabs",
+    "E0,E1 10000,5,20000,5 10000,5,20000,7": "4 cells, must be 2 as in the first row; numbers must have",
+    'E0,E1 "1,5","2,5" "1,5","2,5"': "E0 = '1,5', must be a finite number, with a decimal point",
     "E0,E1,t_in 1e4,2e4,99 1e4,3e4,98": "t_in = 98 to 99, must be in the cycle",
 }
 TRAJECTORIES = {
     "t,x,y,vx 0,0,0,1": "column 'vy' is missing",
-    "t,x,y,vx,vy 0,0,0,1,up": "steps.csv':2: vy = 'up', must be a finite number",
+    "t,x,y,vx,vy 0,0,0,1,2": "column 'wall' is missing",
+    "t,x,y,vx,vy,wall 0,0,0,1,up,": "steps.csv':2: vy = 'up', must be a finite number",
+    "t,x,y,vx,vy,wall 0,0,0,1,1, 1,0,0,1,1,": "steps.csv':3: wall is empty, must be the wall that was hit",
+    "t,x,y,vx,vy,wall 0,0,0,1,1, 1,0,0,1,1,roof": "steps.csv':3: wall is 'roof', must be",
+    "t;x;y;vx;vy;wall 0;0;0;1;1;": "separated by semicolons",
 }
 
 STEPPER = shlex.join([sys.executable, str(Path(conformance.__file__).parent / "harness/python/stepper.py")])
@@ -100,7 +109,7 @@ REFUSED: list[Any] = [
     (f"{STORED} --block 0", ["'--block': 0, must be 1 to 1048576"]),
     (f"{STORED} --block 1e29", ["must be 1 to 1048576"]),
     (f"{STORED} --max-seconds 0", ["'--max-seconds': 0.0,", "> 0"]),
-    (f"{ONE} --threads 999", ["threads = 999"]),
+    (f"{ONE} --threads 999999", ["threads = 999999"]),
     ("theory moving-cap --digits 0", ["'--digits': 0,", "1 to 1000"]),
     ("theory moving-cap --digits 1001", ["'--digits': 1001,", "1 to 1000"]),
     ("theory moving-cap --energy 0", ["'--energy': 0.0,"]),
@@ -170,13 +179,18 @@ REFUSED: list[Any] = [
     (f"check --groups moving-cap,no-such -- {STEPPER}", ["must be one of"]),
     ("check --groups , -- true", ["--groups = ','"]),
     (f"check --known-failures absent.txt -- {STEPPER}", ["absent.txt"]),
+    (
+        f"check --corpus 1.3 -- {STEPPER}",
+        ["corpus", "'1.3'", "earlier release", "1.4", "1.0, 1.1, 1.2, 1.3, 1.4"],
+    ),
+    (f"check --corpus 2.0 -- {STEPPER}", ["corpus", "'2.0'", "does not exist", "1.4"]),
     ("ask", ["ID"]),
     ("ask no-such/1", ["ID = 'no-such/1'"]),
     ("ask fresh/1", ["--seed"]),
     ("ask fresh/999 --seed 1", ["ID = 'fresh/999'"]),
     ("ask moving-cap/3 -- ./no-such-stepper", ["no-such-stepper"]),
     (f"ask moving-cap/3 -- {shlex.join(command('other-protocol'))}", ["does not speak protocol 1"]),
-    ("verify none.json", ["'none.json': No such file"]),
+    ("verify none.json", ["none.json: No such file"]),
     # files that cannot be, or of no such kind
     ("draw moving-cap --out picture.jpeg", ["picture.jpeg", ".svg"]),
     ("draw moving-cap --out nowhere/picture.svg", ["nowhere/picture.svg", "No such"]),
@@ -215,6 +229,8 @@ REFUSED: list[Any] = [
         for name, word in UNDRAWABLE.items()
     ),
     (f"{AUDIT} ../missing.csv", ["No such file"]),
+    ("draw .", ["run '.': it holds no ensemble.zarr: nothing was stored there"]),
+    ("export . --to a.csv", ["nothing was stored there"]),
     (f"{AUDIT} ../e.txt", ["must be a .csv or .parquet file"]),
     (f"{AUDIT} ../no.parquet", ["Parquet"]),
     (f"{AUDIT} ../no.zarr", ["is no Zarr group"]),

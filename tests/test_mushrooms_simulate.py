@@ -2,15 +2,17 @@
 
 import errno
 import gc
-import importlib.util
 import json
 import os
 import re
 import shutil
+import signal
+import socket
 import subprocess
 import sys
 import time
 import weakref
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -24,10 +26,9 @@ from support.refusals import assert_refused
 
 import fast
 import theory
-from conformance.audit import session
 from conformance.audit.runs import SCENES
 from fast.kernel.follow import LANE_ROWS
-from mushrooms import audit_ensemble, bench, orbits, output, questions
+from mushrooms import audit_ensemble, output
 from mushrooms.audit_ensemble import Options
 from mushrooms.main import run
 from mushrooms.output import LOCK, locked
@@ -45,57 +46,6 @@ from mushrooms.store.summary import (
 from scene import Fourier, Mushroom, load
 
 IN_MEMORY = ["simulate", "moving-cap", "--particles", 60, "--energy", 1e4, "--threads", 1, "--json"]
-KEPT = """\
-from numba import njit
-
-@njit(cache=True)
-def follow_particles(n):
-    return n + 1
-"""
-
-
-@pytest.fixture
-def fresh(tmp_path):
-    """Return what makes a compiled function anew, as a new process does; what is compiled is kept on disk."""
-    path = tmp_path / "kept.py"
-    path.write_text(KEPT)
-
-    def make():
-        spec = importlib.util.spec_from_file_location("kept", path)
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        return module.follow_particles
-
-    return make
-
-
-@pytest.mark.parametrize(
-    ("command", "owner", "name"),
-    [
-        (IN_MEMORY, fast, "simulate"),
-        (["audit", "--out"], session, "conduct"),
-        (["bench", "--quick", "--out"], bench, "_measure"),
-        (["attack", "--cases", 1, "--json"], questions, "run"),
-        (["draw", "ergodic", "--trajectory"], orbits, "follow"),
-    ],
-)
-def test_commands_that_compile_say_so_and_only_then(
-    command_line, capsys, fresh, monkeypatch, tmp_path, command, owner, name
-):
-    """The second process finds what the first has kept."""
-
-    def compiles(*_args, **_options):
-        fresh()(1)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(owner, name, compiles)
-    out = [tmp_path / "out.json"] if command[-1] in ("--out", "--json") and command is not IN_MEMORY else []
-    line = "compiling the fast stepper for this machine: about half a minute; kept for next time\n"
-    for n_lines in (1, 0):
-        code, _, err = command_line(*command, *out)
-        assert (code, err.count("\n"), err.count(line)) == (130, 1 + n_lines, n_lines)
-    assert fresh()(1.5) == 2.5  # another type of argument: compiled, but nobody is told outside
-    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize(
@@ -327,13 +277,24 @@ def stored(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _taken_port():
+    """Take the port that Dask's servers ask for by default, as another cluster on this machine does."""
+    with socket.socket() as taken:
+        with suppress(OSError):  # another has it
+            taken.bind(("127.0.0.1", 8787))
+            taken.listen()
+        yield
+
+
 def cluster(n_workers, processes):
+    """Return a cluster on free ports. Without an address its servers would ask for port 8787."""
     return distributed.LocalCluster(
         n_workers=n_workers,
         threads_per_worker=1,
         processes=processes,
-        dashboard_address=None,
-        worker_dashboard_address=None,
+        dashboard_address="127.0.0.1:0",
+        worker_dashboard_address="127.0.0.1:0",
         scheduler_port=0,
     )
 
@@ -473,21 +434,24 @@ def test_exports_have_every_bit(command_line, stored, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "words"),
+    ("name", "content", "words"),
     [
-        (f"{GROUP}/cycle_energies/c/2/0", ["missing or damaged"]),
-        (f"{MARKERS}/1.marker", [f"has {N - 64} of {N} particles", "--resume"]),
+        (f"{GROUP}/cycle_energies/c/2/0", b"", ["missing or damaged"]),
+        (f"{MARKERS}/1.marker", b"", ["block 1 of", "missing or damaged"]),
+        (f"{MARKERS}/1.marker", None, [f"has {N - 64} of {N} particles", "--resume"]),
     ],
 )
 @pytest.mark.parametrize(
     "to", deep_but(["run.csv", "run.parquet", "run.npz", "run.svg"], "run.parquet", "run.svg")
 )
 def test_a_damaged_or_unfinished_run_is_neither_exported_nor_drawn(
-    command_line, stored, tmp_path, name, words, to
+    command_line, stored, tmp_path, name, content, words, to
 ):
     """What pyarrow had begun to write closed itself when nobody held it any more, with a page on stderr."""
     folder, unraised = shutil.copytree(stored, tmp_path / "run"), []
-    (folder / name).write_bytes(b"")
+    (folder / name).unlink()
+    if content is not None:
+        (folder / name).write_bytes(content)
     command = ["draw", folder, "--out"] if to == "run.svg" else ["export", folder, "--to"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "unraisablehook", unraised.append)
@@ -534,20 +498,39 @@ def test_of_a_stored_run_only_its_histogram_is_drawn(command_line, stored, tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
+def when_written(folder):
+    """Return the time at which each block of a stored run was last written."""
+    return {path.name: path.stat().st_mtime_ns for path in (folder / MARKERS).glob("[0-9]*.marker")}
+
+
 @pytest.mark.deep
 def test_a_run_killed_at_random_moments_goes_on_to_the_same_bits(tmp_path):
-    """Processes are killed (SIGKILL) while they follow, and lengthen, a run; then one is left to finish."""
-    scene, random = "fermi-ulam", np.random.default_rng(1)
+    """Processes are killed (SIGKILL) while they follow, and lengthen, a run; then one is left to finish.
+
+    The moment is a number of blocks, so that it lies within the run on any machine.
+    """
+    scene = "fermi-ulam"
+    n_blocks = 75
+    n_kills = int(os.environ.get("MUSHROOMS_KILLS", "2"))
+    random = np.random.default_rng(1)
     options = ["--particles", "1500", "--energy", "1e3", "--block", "20", "--threads", "1", "--resume"]
     wanted = fast.simulate(load(scene), n_particles=1500, energy=1e3, n_cycles=2).sha256()
     command = [sys.executable, "-m", "mushrooms", "simulate", scene, *options, "--json"]
-    for number in range(int(os.environ.get("MUSHROOMS_KILLS", "2"))):
-        place = ["--out", str(tmp_path / str(number // 5)), "--cycles", str(1 + (number % 5 > 2))]
+    folders = [tmp_path / str(number // 2) for number in range(n_kills)]
+    for number, folder in enumerate(folders):
+        place = ["--out", str(folder), "--cycles", str(1 + number % 2)]
+        before = when_written(folder)
+        n_more = random.integers(1, n_blocks // 2)
+        give_up = time.monotonic() + 300.0  # a child that writes nothing
         child = subprocess.Popen([*command, *place], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        time.sleep(random.uniform(1.0, 4.0))  # its start takes a second
+        while len(when_written(folder).items() - before.items()) < n_more:
+            assert child.poll() is None, "it ended before it was killed"
+            assert time.monotonic() < give_up, "it writes nothing"
+            time.sleep(0.001)
         child.kill()
-        child.wait()
-    for folder in tmp_path.iterdir():
+        assert child.wait() == -signal.SIGKILL
+        assert len(when_written(folder).items() - before.items()) < n_blocks
+    for folder in dict.fromkeys(folders):
         place = ["--out", str(folder), "--cycles", "2"]
         done = subprocess.run([*command, *place], capture_output=True, text=True, check=True)
         assert json.loads(done.stdout)["sha256"] == wanted

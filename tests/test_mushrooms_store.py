@@ -170,6 +170,18 @@ DAMAGES = [
 ]
 
 
+def test_a_table_of_too_many_columns_is_refused_before_it_is_begun(command_line, tmp_path, monkeypatch):
+    """A row of it would hold every cycle of a particle; arrays hold as many as there are."""
+    monkeypatch.chdir(tmp_path)
+    slow = ["simulate", "fermi-ulam", "--particles", 2, "--energy", 0.01, "--cycles", 11000, "--out", "long"]
+    assert command_line(*slow).code == 0
+    for to in ("long.csv", "long.parquet"):
+        ended = command_line("export", "long", "--to", to)
+        assert_refused(ended, "columns, must be at most 10000", ".npz", "xarray")
+        assert not Path(to).exists()
+    assert command_line("export", "long", "--to", "long.npz").code == 0
+
+
 @pytest.mark.parametrize("case", deep_but(DAMAGES, *DAMAGES[:4]))
 def test_a_damaged_file_is_mended_and_its_block_followed_again(command_line, finished, followed, whole, case):
     """Of one array's description nothing is followed again; that of the run is there twice."""
@@ -420,6 +432,16 @@ def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
     assert digest_of(ended) == at_once(N_LONG, 3).sha256()
     # Its first chunks hold the cycles there were, with the same bits, or later ones alone.
     assert ("1 blocks (0)" in ended.err) == (n_written > 3)
+
+
+def test_a_run_may_be_lengthened_many_times_over_but_not_endlessly(command_line, tmp_path, monkeypatch):
+    """Each chunk of cycles is a file of every array."""
+    summary_of(command_line(*lengthened(tmp_path, 2)))
+    before = held(tmp_path)
+    monkeypatch.setattr(fast, "go_on", None)
+    words = "--cycles = 401, must be at most 400 for a run that began with 2"
+    assert_refused(command_line(*lengthened(tmp_path, 401)), words)
+    assert held(tmp_path) == before
 
 
 def test_a_chunk_holds_the_cycles_that_a_run_began_with_and_is_written_once(command_line, tmp_path):

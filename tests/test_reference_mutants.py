@@ -20,7 +20,7 @@ from support.tables import BREATHING, LEAP, LIFT
 from support.truth import IS_DEEP, is_delicate, jacobian_error, proved_step
 
 import reference
-from conformance.cases.certify import claimed_path
+from conformance.cases.certify import claimed_path, with_further
 from conformance.cases.delicate_families import sunk
 from conformance.cases.draw import wire_form
 from conformance.strategies import scenes_and_states
@@ -62,7 +62,8 @@ TINY = Fraction(1, 10**40)
 def judge(scene, state, t_end, claim, kind="step"):
     """Return what the verifier says of a claim that is written as a line of the corpus."""
     question = {"kind": kind, "scene": wire_form(scene), "state": state, "t_end": t_end}
-    line = {**question, "collisions": max(len(claim.steps), 1), "expect": [claim]}
+    expect = with_further(claim, scene, state)
+    line = {**question, "collisions": max(len(claim.steps), 1), "expect": expect}
     return verify_line(json.loads(msgspec.json.encode(line)))
 
 

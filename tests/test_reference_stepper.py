@@ -10,7 +10,7 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from mpmath import fp
 from msgspec.structs import replace
 from support.tables import BOX, CIRCLE, STATIC
@@ -301,9 +301,10 @@ def test_step_keeps_the_symplectic_form(drawn):
     """In free flight starts (no residual) the step is symplectic in (x, y, vx, vy, t, E)."""
     scene, state, t_end = drawn
     free = replace(state, wall=None)
-    if found := differentiated(scene, free, 1, t_end):
-        jacobian, end = found
-        assert is_kept(jacobian, free, end, Fraction(1, 10**25))
+    found = differentiated(scene, free, 1, t_end)
+    assume(found)  # Hypothesis refuses a test whose examples are nearly all left out
+    jacobian, end = found
+    assert is_kept(jacobian, free, end, Fraction(1, 10**25))
 
 
 @pytest.mark.parametrize("scale", [Fraction(1001, 1000), Fraction(-1)])

@@ -382,7 +382,9 @@ def test_corners_lie_on_two_walls_or_on_the_mouth_s_edge(scene):
     for region, walls in (("cap", ("arc", "base")), ("stem", ("left", "right", "floor", "base"))):
         present = [wall for wall in walls if wall in scene.walls]
         if len(present) > 1:
-            for x, y in now.corners(region):
+            corners = list(now.corners(region))
+            assert len(corners) >= 2
+            for x, y in corners:
                 near = sum(abs(now.gap(wall, x, y)) <= 1e-15 * now.size for wall in present)
                 assert near >= 1 + (abs(x) != now.w or isinstance(scene, Stem))
 

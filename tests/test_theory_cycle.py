@@ -112,6 +112,7 @@ def test_bang_bang_width_and_radius_turn_between_knots() -> None:
 def test_times_of_capture_and_release_have_the_mouth_asked_for_to_all_digits(name: str, digits: int) -> None:
     """Parabolas are inverted in closed form, waves from a solution in binary64."""
     cycle = Cycle.of(load(name), digits)
+    assert cycle.pieces
     for piece in cycle.pieces:
         for stretch in (piece.capture, piece.release):
             for share in (0.01, 0.5, 0.99):

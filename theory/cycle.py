@@ -25,10 +25,11 @@ from itertools import pairwise
 from math import lcm
 from typing import Any, NamedTuple
 
-from mpmath import MPContext, fp
+from mpmath import fp
 
 from scene.laws import Fourier, Piece, Quadratic, exact, frequency, piece_at
 from scene.mouth import mouth_factors
+from scene.precision import Decimals
 from scene.refusal import BadInput, check_count
 from scene.tables import Mushroom, Scene, laws, period
 from theory.critical import Span, solve_rising, spans
@@ -79,8 +80,7 @@ class Cycle:
         """
         mushroom = as_mushroom(scene)
         digits = check_count("digits", digits, 1, MAX_DIGITS)
-        ctx = MPContext()
-        ctx.dps = digits + GUARD
+        ctx = Decimals(digits + GUARD)
         settle(ctx)
         shared = period(mushroom)
         length = shared.value(ctx) if shared else None
@@ -374,6 +374,7 @@ class MovingMushroom:
 
     def __init__(self, ctx: Any, scene: Mushroom, time: Fraction) -> None:
         self.ctx, self.binary = ctx, Binary(ctx)
+        self._made_of = ctx, scene, time
         pieces = {name: piece_at(law, time) for name, law in laws(scene).items()}
         width, radius = (piece_at(law, time) for law in mouth_factors(scene))
         with self.binary.working():
@@ -382,6 +383,10 @@ class MovingMushroom:
             self._half, self._4_by_pi = self.binary.one / 2, 4 / self.binary.pi
             self.mouth = _mouth(self.binary, (width, radius))
         self._rough_mouth = _mouth(fp, (width, radius))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Tell pickle and copy how to make the same motion: its functions cannot be pickled."""
+        return type(self), self._made_of
 
     def nu(self, t: Any) -> tuple[Any, Any]:
         """Return the mouth w / r at time t, and its rate. Source: Eq:nu, eq:dnu."""

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from scene.precision import reduce_record
 from scene.tables import Scene
 from theory.adiabatic import Captures, Placed
 from theory.branches import turns
@@ -41,6 +42,10 @@ class Caustic(NamedTuple):
     s: Any
     strength: Any
     is_largest: bool
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Tell pickle and copy how to keep every bit."""
+        return reduce_record(self)
 
 
 class ChebyshevSeries:

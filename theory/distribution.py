@@ -24,6 +24,7 @@ import numpy as np
 from mpmath import fp
 from numpy.typing import ArrayLike, NDArray
 
+from scene.precision import reduce_record
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Scene
 from theory.adiabatic import Captures, least_exponential, mean_exponential
@@ -292,6 +293,10 @@ class Rarity(NamedTuple):
 
     rate: Any
     place: Any
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Tell pickle and copy how to keep every bit."""
+        return reduce_record(self)
 
 
 @guarded

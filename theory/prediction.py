@@ -22,6 +22,7 @@ import msgspec
 
 from scene.laws import Law
 from scene.notebook import rows
+from scene.precision import reduce_record
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Mushroom, Scene, laws
 from scene.transforms import backwards
@@ -56,6 +57,10 @@ class Prediction(NamedTuple):
     sd: Any
     mean_exp_minus: Any
     mean_exp_plus: Any
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Tell pickle and copy how to keep every bit."""
+        return reduce_record(self)
 
     @guarded
     def strings(self, digits: int) -> dict[str, str]:

@@ -2,7 +2,8 @@
 
 A volume is 2 pi times an area, weighted by the share of directions; at energy E it is
 sqrt(2 E) times larger. Every formula takes the number system first: `mpmath.fp` for floats,
-an `MPContext` for many digits, `numpy` for arrays. Intervals are not handled.
+an `MPContext` for many digits, `numpy` for arrays. Intervals are not handled. A `Volumes` may be copied and
+pickled to the last digit. A single number of your own `MPContext` may not: mpmath rounds its copies.
 
 Invariants and rates of energy follow from them.
 """
@@ -16,6 +17,7 @@ import numpy as np
 from mpmath import fp
 
 from scene.laws import Law, value
+from scene.precision import reduce_record
 from scene.refusal import BadInput, check_number, shown
 from scene.tables import Mushroom, Scene, check_scene
 from scene.transforms import scaled
@@ -37,6 +39,10 @@ class Volumes(NamedTuple):
     v_ell: Any
     v_cha: Any
     nu: Any
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Tell pickle and copy how to keep every bit."""
+        return reduce_record(self)
 
 
 def v_cap(ctx: Any, r: Any) -> Any:

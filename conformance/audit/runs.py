@@ -148,6 +148,11 @@ def scene_of(run: Simulation) -> Scene:
     return scene_named(run.scene)
 
 
+def is_scene(name: str) -> bool:
+    """Tell whether this is the name of a scene of the audit or of the catalogue."""
+    return name in SCENES or name in scenes.catalogue()
+
+
 def scene_named(name: str) -> Scene:
     """Return one of SCENES, or what `scene.load` knows.
 

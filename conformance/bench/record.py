@@ -176,7 +176,24 @@ def read(path: Path) -> Record:
         raise BadInput(f"{path} is no bench.json: {error}") from None
     if record.format != FORMAT:
         raise BadInput(f"{path}: format = {record.format}, must be {FORMAT}")
+    _check_points(record, path)
     return record
+
+
+def _check_points(record: Record, path: Path) -> None:
+    """Refuse a point of an unknown workload, and a second one: which of two holds is unknown."""
+    names = [drawn.name for drawn in record.workloads]
+    seen: set[tuple[str, str]] = set()
+    for point in record.points:
+        which = f"{path} is no bench.json: a point of {point.solver!r} on {point.workload!r}"
+        if point.workload not in names:
+            raise BadInput(f"{which} is of a workload that it does not name")
+        if (point.workload, point.solver) in seen:
+            raise BadInput(f"{which} stands twice")
+        seen.add((point.workload, point.solver))
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise BadInput(f"{path} is no bench.json: workload {twice!r} stands twice")
 
 
 def json_schema() -> dict[str, Any]:

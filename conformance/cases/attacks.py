@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from conformance.cases.certify import claimed_path, judge, proved_step
+from conformance.cases.certify import claimed_path, judge, proved_step, with_further
 from conformance.cases.draw import Family, Proved, Question, file_vector
 from conformance.grading.agreement import SHARP, compare
 from conformance.vectors import Expectation
@@ -150,7 +150,7 @@ def confirmed(attack: Question) -> Judgement:
     if is_undecided and not claim.steps:
         return Judgement("undecided", claim.reason, seconds=seconds)
     written = Expectation("collision", claim.steps) if is_undecided else claim
-    proved = Proved((written,), collisions=max(n_steps, 1))
+    proved = Proved(with_further(written, scene, state), collisions=max(n_steps, 1))
     verdict = judge(file_vector(attack._replace(group="attack", is_flow=False), 1, proved, "stress"))
     if verdict.status == "false":
         return Judgement("wrong", f"the reference claims what is false: {verdict.reason}", seconds=seconds)

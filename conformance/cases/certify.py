@@ -55,6 +55,7 @@ from scene import (
     Undefined,
     from_data,
 )
+from scene.protocol.rules import may_be_refused, without_loose
 
 # What a level asks (docs/corpus.md): nudges that change no wall, and the largest condition number.
 NUDGES: dict[Level, float] = {"core": 2.0**-30, "extended": 2.0**-44}
@@ -62,6 +63,7 @@ CONDITIONS = {"core": 1e6, "extended": 1e12}
 # Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
 SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
 Matrix = list[list[float]]
+REFUSAL = Expectation("rejected")
 GUARD = 6  # decimals asked of the reference beyond those that are written down
 
 
@@ -90,8 +92,7 @@ def measured_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS
     if isinstance(outcome, Rejected):
         return Proved((Expectation("rejected"),))
     if isinstance(outcome, Undefined):
-        # A stepper in binary64 may find the tie within rounding, and say no more than that.
-        return Proved((Expectation("undefined", reason=outcome.reason), Expectation("undecided")), inf)
+        return Proved((Expectation("undefined", reason=outcome.reason),), inf)
     if isinstance(outcome, reference.Horizon):
         numbers = coasted(outcome, (Fraction(state.t),) * 2)
         step = certified(numbers, links.coast(numbers), None, digits=digits)
@@ -441,16 +442,16 @@ def certify(question: Question, number: int) -> Vector:
         Unfit: when there is no answer to certify, or the verifier cannot prove it.
         FalseClaim: when the verifier holds it to be false.
     """
+    data, is_loose = without_loose(question.wire_scene())
     scene: Scene | None = None
     try:
-        scene = from_data(question.wire_scene())
+        scene = from_data(data)
     except BadInput:
-        proved = Proved((Expectation("rejected"),))
+        proved = Proved((REFUSAL,))
     else:
         is_step = question.kind == "step"
         proved = _step(scene, question) if is_step else proved_path(scene, question)
-    also = [Expectation(kind) for kind in question.also]
-    expect = tuple(dict.fromkeys([*proved.expect, *also]))
+    expect = with_further(proved.expect[0], scene, question.state, is_loose=is_loose)
     rounded = four_digits(min(proved.condition, INFINITE))
     vector = file_vector(question, number, proved._replace(expect=expect, condition=rounded), "stress")
     vector = msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
@@ -459,6 +460,28 @@ def certify(question: Question, number: int) -> Vector:
         failure = FalseClaim if verdict.status == "false" else Unfit
         raise failure(f"{vector.id} is {verdict.status}: {verdict.reason}")
     return vector
+
+
+def with_further(
+    known: Expectation, scene: Scene | None, state: State, *, is_loose: bool = False
+) -> tuple[Expectation, ...]:
+    """Return a right answer with the further answers that the rules permit (`scene.protocol.rules`).
+
+    A refusal comes first for a scene with fields that may be ignored, because `scene.from_data` refuses it.
+
+    Args:
+        known: the right answer.
+        scene: table and laws; None for none.
+        state: the start.
+        is_loose: whether the scene was given with fields that may be ignored.
+    """
+    if scene is None or known.outcome == "rejected":
+        return (known,)
+    # A stepper in binary64 may find a tie within rounding, and say no more than that.
+    found = (known, Expectation("undecided")) if known.outcome == "undefined" else (known,)
+    if is_loose:
+        return (REFUSAL, *found)
+    return (*found, REFUSAL) if may_be_refused(scene, state) else found
 
 
 def judge(vector: Vector) -> Verdict:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 
-from conformance.vectors import Expectation, Kind, Level, OutcomeName, Vector
+from conformance.vectors import Expectation, Kind, Level, Vector
 from scene import BadInput, Scene, State, Wall, from_data, to_data
 
 T = TypeVar("T")
@@ -118,7 +118,6 @@ class Question(NamedTuple):
         collisions: None for a step; for a trajectory how many are tried, for a flow how many at most.
         is_flow: whether it asks for a flow, whose path has all collisions up to t_end.
         longest: condition number up to which a trajectory or a flow is followed.
-        also: outcomes that are right beside the proved one.
         level: None to measure it.
         working: decimals that the reference may work with on a trajectory; None lets it choose.
         rule: what it tests, where that is more than the aim of its family.
@@ -132,7 +131,6 @@ class Question(NamedTuple):
     collisions: int | None = None
     is_flow: bool = False
     longest: float = LONGEST
-    also: tuple[OutcomeName, ...] = ()
     level: Level | None = None
     working: int | None = None
     rule: str = ""

@@ -43,6 +43,7 @@ import msgspec
 from conformance.vectors import NUMBERS, Certified, Ends, Expectation, Vector
 from scene import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined, Wall
 from scene.protocol.messages import Answered, AnsweredCollision, Flown, Steps
+from scene.protocol.rules import does_undecided_pass
 
 U = Fraction(1, 2**53)
 LEAST = Fraction(1, 2**1075)  # half the spacing of subnormal numbers: nothing rounds better
@@ -365,25 +366,24 @@ def grade(vector: Vector, answer: Any) -> Agreement:
         return Agreement("error", why=" ".join(answer["error"].split())[:200])
     try:
         parts = _parts(vector, answer)
-        outcomes = [msgspec.convert(msgspec.to_builtins(part), Answered) for part in parts]
+        given = [msgspec.convert(msgspec.to_builtins(part), Answered) for part in parts]
     except (TypeError, msgspec.ValidationError, OverflowError, RecursionError) as error:
         return Agreement("wrong-format", why=" ".join(str(error).split()))
     physics = physics_bound(vector.condition)
     if vector.kind == "flow":
         captured = getattr(parts[0], "captured", None)
-        found = [
-            compare_arrival(outcomes[0], captured, known, vector.state, physics) for known in vector.expect
-        ]
+        found = [compare_arrival(given[0], captured, known, vector.state, physics) for known in vector.expect]
     else:
-        asked: Answer | list[Answer] = outcomes if vector.kind == "trajectory" else outcomes[0]
+        asked: Answer | list[Answer] = given if vector.kind == "trajectory" else given[0]
         found = [compare(asked, known, vector.state, physics=physics) for known in vector.expect]
     graded = min(found, key=lambda one: _PREFERENCE.index(one.verdict))
     if graded.verdict == "pass" and not math.isnan(graded.relative) and vector.condition * physics >= 1:
         none = f"the walls alone are graded: condition {vector.condition:.1g} allows no number"
         graded = graded._replace(why=none)
-    if graded.verdict == "declined" and {"rejected"} < {known.outcome for known in vector.expect}:
+    outcomes = {known.outcome for known in vector.expect}
+    if graded.verdict == "declined" and does_undecided_pass(outcomes):
         graded = graded._replace(verdict="pass", why=f"{graded.why}; a refusal is allowed here")
-    if any(isinstance(outcome, AnsweredCollision) and outcome.dt is None for outcome in outcomes):
+    if any(isinstance(outcome, AnsweredCollision) and outcome.dt is None for outcome in given):
         return graded._replace(why=f"{graded.why}; without dt, t is graded in its place")
     return graded
 

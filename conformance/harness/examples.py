@@ -56,6 +56,11 @@ def find_kit_examples(folder: Path, flags: Sequence[str] = ("-O3",)) -> dict[str
     }
 
 
+def find_compiler(language: str) -> str | None:
+    """Return the path of the first compiler of a language that is installed."""
+    return next(filter(None, map(shutil.which, COMPILERS[language])), None)
+
+
 def compiled(
     language: str, flags: Sequence[str], source: Path, program: Path, libraries: Sequence[str] = ()
 ) -> Example:
@@ -68,7 +73,7 @@ def compiled(
         program: what to write.
         libraries: flags that come after the file.
     """
-    compiler = next(filter(None, map(shutil.which, COMPILERS[language])), None)
+    compiler = find_compiler(language)
     if not compiler:
         return Example(why_not=f"no {language} compiler is installed", is_absent=True)
     line = [compiler, *flags, "-o", str(program), str(source), *libraries]
@@ -79,8 +84,13 @@ def compiled(
 
 
 def _build_c(folder: Path, flags: Sequence[str]) -> Example:
-    source = FOLDER / "c" / "stepper.c"
-    built = compiled("C", [*flags, "-std=gnu11"], source, folder / source.stem, ["-ljansson", "-lm"])
-    if "jansson.h" in built.why_not:
-        return Example(why_not="jansson.h is not installed (Debian: libjansson-dev)", is_absent=True)
-    return built
+    source, libraries = FOLDER / "c" / "stepper.c", ["-ljansson", "-lm"]
+    built = compiled("C", [*flags, "-std=gnu11"], source, folder / source.stem, libraries)
+    if built.command or built.is_absent:
+        return built
+    # Errors in the example may name jansson's header too. A program that has nothing else tells them apart.
+    probe = folder / "probe.c"
+    probe.write_text("#include <jansson.h>\nint main(void) { return json_null() == 0; }\n", "utf-8")
+    if compiled("C", [], probe, folder / probe.stem, libraries).command:
+        return built
+    return Example(why_not="jansson is not installed (Debian: libjansson-dev)", is_absent=True)

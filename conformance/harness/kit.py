@@ -53,6 +53,8 @@ def serve_engine(name: str, next_hit: NextHit) -> None:
         def outcome(self) -> Any:  # an answer as the protocol has it, without dt
             if refusal := self.refusal():
                 return refusal
+            if self.t_end == self.state.t:
+                return self.horizon()
             if self.wall is None and self.y == self.vy == 0:
                 raise UndecidedError("it flies along the mouth")
             answer = _answer_of(next_hit, self.scene, _leaving(self), self.t_end)

@@ -500,7 +500,10 @@ def next_collision(scene: Scene, state: State, t_end: float, flight: type[Flight
         for field in ("x", "y", "vx", "vy"):
             if abs(value := getattr(state, field)) > LARGEST:
                 return Undecided(f"state.{field} = {value!r} is beyond 2^400: squares overflow")
-        return flight(scene, state, t_end).outcome()
+        outcome = flight(scene, state, t_end).outcome()
+        if isinstance(outcome, Undefined) and t_end == state.t:  # it has arrived, and need not fly on
+            return Horizon(t_end, state.x, state.y, state.vx, state.vy)
+        return outcome
     except InvalidState as error:
         return Rejected(str(error))
     except UndecidedError as question:

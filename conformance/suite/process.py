@@ -131,7 +131,11 @@ class CheckFailure(Exception):  # noqa: N818 (a finding about the stepper)
 
     def __init__(self, verdict: str, why: str) -> None:
         self.verdict, self.why = verdict, clean(why)
-        super().__init__(f"{verdict}: {self.why}")
+        super().__init__(verdict, self.why)  # what a copy is made of
+
+    def __str__(self) -> str:
+        """Return verdict and reason."""
+        return f"{self.verdict}: {self.why}"
 
 
 class Transcript:

@@ -23,9 +23,34 @@ LAWS = ("fourier", "bang-bang", "constant")
 PARTS = {"profiles": PROFILES, "tables": TABLES, "laws": LAWS}
 BAD = ("fail", "crashed", "timed-out", "wrong-format", "error")
 VERDICTS = ("pass", "fail", "indeterminate", "declined", "unsupported", *BAD[1:])
-# An implementation that declines more has not been graded: of all questions, and of those of one group.
-MAX_DECLINED, MAX_DECLINED_OF_GROUP = 0.05, 0.25
+# A stepper that declines more has not been graded: of all vectors and fresh questions; of a part, which is
+# one group of these, or one check.
+MAX_DECLINED, MAX_DECLINED_OF_PART = 0.05, 0.25
+DOUBT = 1e-2  # probability of as many undecided answers at the limit: below it the limit is surely exceeded
 NOT_KNOWN = "though it is listed as a known failure"
+
+
+def declines_too_much(n_declined: int, n: int, limit: float) -> bool:
+    """Tell whether n_declined of n answers show that a stepper declines more than a limit.
+
+    They do if a stepper that declines at the limit, each answer for itself, leaves so many or more undecided
+    with a probability below DOUBT. The verdict on a stepper well within the limit then depends neither on the
+    draw nor on how many answers are asked for. No fewer than four answers show a share above 25 %.
+
+    Args:
+        n_declined: answers that are undecided where `undecided` does not pass.
+        n: answers in all.
+        limit: greatest share of them, above 0 and below 1.
+    """
+    if n_declined <= limit * n:
+        return False
+    tail = 0.0
+    for k in range(n_declined, n + 1):
+        log_ways = math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
+        tail += math.exp(log_ways + k * math.log(limit) + (n - k) * math.log1p(-limit))
+        if tail >= DOUBT:
+            return False
+    return True
 
 
 class Result(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -48,6 +73,9 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
         is_known: listed in the known-failures file.
         sent: of a case that did not pass, the last line that was sent for it.
         paste: of a check that failed, the question as a pytest case.
+        n_answers: of a check, how many different answers were asked for: of the command of which too many are
+            undecided, if there is one, or else of all.
+        n_undecided: of these, how many were undecided where `undecided` does not pass.
     """
 
     id: str
@@ -66,6 +94,13 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
     is_known: bool = False
     sent: str = ""
     paste: str = ""
+    n_answers: int = 0
+    n_undecided: int = 0
+
+    @property
+    def is_declined(self) -> bool:
+        """Tell whether this is a check of which too many answers are undecided."""
+        return declines_too_much(self.n_undecided, self.n_answers, MAX_DECLINED_OF_PART)
 
     @property
     def is_right(self) -> bool:
@@ -81,7 +116,7 @@ class Scope(msgspec.Struct, frozen=True):
         corpus: version of the vectors.
         tables, laws, profiles: graded ones.
         not_graded: the others.
-        declined: share of the questions that were declined.
+        declined: share of the vectors and fresh questions that were declined.
         precision: class A, B or C, or a dash.
         seed: of the run.
     """
@@ -180,26 +215,33 @@ class Run(msgspec.Struct, frozen=True):
         return found if vectors_passed or found else ["no vector passed: nothing was graded"]
 
     def _declined_too_often(self) -> dict[str, str]:
-        """Say where too much was declined for the rest to speak for it: by declined/all and declined/GROUP.
+        """Say where too much was declined for the rest to speak for it.
 
-        What is at level stress may be declined in any group, as binary64 cannot tell; it counts in all.
+        Returns:
+            A line for each, by declined/all, declined/GROUP, or the name of a check.
         """
+        limits = {"all": MAX_DECLINED} | dict.fromkeys(self.groups(), MAX_DECLINED_OF_PART)
         found = {}
-        for group, most in ((None, MAX_DECLINED), *((name, MAX_DECLINED_OF_GROUP) for name in self.groups())):
-            declined, asked = self.declined(group)
-            if declined > max(most * asked, 1 if group else 0):
-                of = f"in group {group}" if group else "cases"
-                found[f"declined/{group or 'all'}"] = (
-                    f"declined {declined} of {asked} {of}, more than {most:.0%}"
+        for name, limit in limits.items():
+            n_declined, n = self.declined(None if name == "all" else name)
+            if declines_too_much(n_declined, n, limit):
+                of = "vectors and fresh questions" if name == "all" else f"in group {name}"
+                found[f"declined/{name}"] = f"declined {n_declined} of {n} {of}: surely more than {limit:.0%}"
+        for result in self.results:
+            if result.is_declined and not result.is_known:
+                found[result.id] = (
+                    f"{result.id}: {result.n_undecided} of {result.n_answers} answers are undecided:"
+                    f" surely more than {MAX_DECLINED_OF_PART:.0%}"
                 )
         return found
 
     def declined(self, group: str | None = None) -> tuple[int, int]:
-        """Count the questions declined and those asked: of all, or of a group's below level stress.
+        """Count the vectors and fresh questions that were declined, and those that were asked.
 
-        Profiles, which the suite declines, are left out.
+        Args:
+            group: only those of this group, and below level stress, where binary64 may not decide.
         """
-        counted = [r for r in self.results if r.group != "profile"]
+        counted = [result for result in self.results if result.level]
         if group:
             counted = [r for r in counted if r.group == group and r.level != "stress"]
         counts = Counter(r.verdict for r in counted)

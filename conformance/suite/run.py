@@ -36,7 +36,8 @@ from conformance.suite.process import NOT_NUMBERS, CheckFailure
 from conformance.suite.result import BAD, Result, Run, Speed, graded_parts
 from conformance.suite.session import AnswerLine, Limits, Session, missing, outcomes_of
 from conformance.vectors import NUMBERS, Vector
-from scene import BadInput, State, load, to_data, transforms
+from scene import BadInput, State, from_data, load, to_data, transforms
+from scene.protocol.rules import may_be_refused
 from scene.refusal import check_seed
 
 NEW_SEEDS = 10**6  # short enough to be typed again
@@ -152,9 +153,20 @@ def draw_transform(vector: Vector, seed: int) -> Transform:
     is_mirrored = own.pick((False, True))
     exponents = [k for k in range(-LARGEST, LARGEST + 1) if k]
     length, time = shared.pick(exponents), shared.pick(exponents)
-    if readable(vector.scene) is None or not _stays_in_range(vector, length, time):
+    if readable(vector.scene) is None:
         return Transform(is_mirrored)
-    return Transform(is_mirrored, length, time)
+    # Lateness counts units of time where nothing moves: no question may become one that may be refused.
+    for image in (Transform(is_mirrored, length, time), Transform(is_mirrored, length)):
+        if not _stays_in_range(vector, image.length, image.time):
+            continue
+        if _may_be_refused(image.apply(vector)) == _may_be_refused(vector):
+            return image
+    return Transform(is_mirrored)
+
+
+def _may_be_refused(vector: Vector) -> bool:
+    """Tell whether a question in a valid scene may be refused, by its own numbers."""
+    return may_be_refused(from_data(vector.scene), vector.state)
 
 
 def _stays_in_range(vector: Vector, length: int, time: int) -> bool:
@@ -221,7 +233,7 @@ def read_known(path: Path) -> frozenset[str]:
     """Read a known-failures file: one name a line, # begins a comment.
 
     A name is a case's id; ID@SEED for the run of one seed, which a fresh question needs; fresh/* for all of
-    these, which may pass; declined/GROUP or declined/all where too much is declined.
+    these, which may pass; declined/GROUP or declined/all where too many vectors are declined.
 
     Raises:
         BadInput: naming the line whose name the suite does not have, or that comes twice.
@@ -232,7 +244,7 @@ def read_known(path: Path) -> frozenset[str]:
         raise BadInput(f"known failures {str(path)!r} cannot be read: {error}") from None
     corpus = vectors.load("stress")
     names = {vector.id for vector in corpus} | set(OTHER_CASES) | {f"{FRESH}/*"}
-    names |= {f"declined/{group}" for group in ("all", *OTHER_GROUPS, *(v.group for v in corpus))}
+    names |= {f"declined/{group}" for group in ("all", FRESH, *(v.group for v in corpus))}
     drawn = {f"{FRESH}/{number}" for number in range(1, max(N_FRESH.values()) + 1)}
     found: set[str] = set()
     for number, line in enumerate(lines, 1):

@@ -23,7 +23,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from functools import partial
 from types import TracebackType
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar
 
 import msgspec
 from mpmath import fp
@@ -35,7 +35,6 @@ from scene.protocol.messages import (
     PROTOCOL,
     Answered,
     AnsweredCollision,
-    Arrival,
     Echoed,
     Failed,
     Flown,
@@ -44,6 +43,7 @@ from scene.protocol.messages import (
     Timed,
     with_minus_zeros,
 )
+from scene.protocol.rules import without_loose
 
 AnswerLine = Callable[[bytes], bytes]
 T = TypeVar("T")
@@ -283,6 +283,9 @@ UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 ANSWERS = {"step": Answered, "trajectory": Steps, "flow": Flown, "time": Timed}
 
 
+MAX_OFFERED = 100  # names of profiles, tables or laws that are kept of an introduction
+
+
 class _Envelope(msgspec.Struct):
     seq: Any = None
     outcome: Any = None
@@ -291,8 +294,6 @@ class _Envelope(msgspec.Struct):
 
 
 WHOLE = ("seq", "ns", "protocol")  # what is whole by the schema, where 17.0 is an integer
-_FORMS = (Introduction, Echoed, Failed, *get_args(Answered), Arrival, Steps, Flown, Timed)
-NAMED = {"outcome"}.union(*(form.__struct_fields__ for form in _FORMS))  # the fields of answers
 
 
 def read_introduction(line: bytes) -> Introduction:
@@ -307,9 +308,8 @@ def read_introduction(line: bytes) -> Introduction:
             "wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}"
         )
     texts = {name: clean(getattr(introduction, name)) for name in ("name", "version", "language")}
-    offered = {
-        name: tuple(map(clean, getattr(introduction, name))) for name in ("profiles", "tables", "laws")
-    }
+    lists = {name: getattr(introduction, name) for name in ("profiles", "tables", "laws")}
+    offered = {name: tuple(map(clean, given[:MAX_OFFERED])) for name, given in lists.items()}
     return msgspec.structs.replace(introduction, **texts, **offered)
 
 
@@ -394,7 +394,7 @@ def with_walls(answer: dict[str, Any], scene: Any) -> dict[str, Any]:
     for part in outcomes_of(answer):
         if part.get("outcome") == "collision" and "wall" not in part:
             try:
-                table = table_at(fp, from_data(scene), part["t"])
+                table = table_at(fp, from_data(without_loose(scene)[0]), part["t"])
             except (ValueError, ArithmeticError):
                 return answer  # no scene at all, or a time beyond its numbers: nothing can have been met
             part["wall"] = table.nearest_wall(part["x"], part["y"])
@@ -417,12 +417,10 @@ def _read(cmd: str, line: bytes, form: Any, *, is_checked: bool = False) -> Any:
 
 
 def _once(pairs: list[tuple[str, object]]) -> None:
-    """Refuse a named field that stands twice in one object: of two, readers take either."""
+    """Refuse a field that stands twice in one object, known or not: of two, readers take either."""
     if len({name for name, _ in pairs}) < len(pairs):
-        counts = Counter(name for name, _ in pairs)
-        for name in NAMED & counts.keys():
-            if counts[name] > 1:
-                raise msgspec.ValidationError(f"Field `{name}` stands twice")
+        (name, _), *_ = Counter(name for name, _ in pairs).most_common(1)
+        raise msgspec.ValidationError(f"Field `{clean(name)[:60]}` stands twice")
 
 
 FIELDS_ONCE = json.JSONDecoder(object_pairs_hook=_once, parse_int=str, parse_float=str)

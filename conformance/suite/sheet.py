@@ -78,6 +78,8 @@ COLUMNS = ("seq", "cmd", "collisions", *STATE, "wall", "t_end")  # of questions
 NEEDED = ("seq", "outcome", *STATE)  # of answers
 OPTIONAL = ("wall", "dt", "t_in", "t_out", "reason")
 
+SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
+
 
 class SheetQuestion(NamedTuple):
     """A question of a sheet: the case it is of, its sequence number, and the request, whatever its own is."""
@@ -437,7 +439,7 @@ def read_rows(
         reader = csv.reader(file)
         rows = (row for row in reader if any(map(str.strip, row)) and not row[0].startswith("#"))
         try:
-            names = [name.strip() for name in next(rows, [])]
+            names = _names(next(rows, []), label)
             lacking = [name for name in needed if name not in names]
             twice = [name for i, name in enumerate(names) if name in names[:i]]
             unknown = [name for name in names if known and name not in known]
@@ -448,11 +450,46 @@ def read_rows(
             for row in rows:
                 place = f"{label}:{reader.line_num}"
                 if len(row) != len(names):
-                    raise BadInput(f"{place}: {len(row)} cells, must be {len(names)} as in the first row")
+                    raise BadInput(f"{place}: {_miscounted(row, names)}")
                 yield place, dict(zip(names, map(str.strip, row), strict=True))
         except (csv.Error, UnicodeDecodeError) as error:
-            why = error if isinstance(error, csv.Error) else "it is no UTF-8"
-            raise BadInput(f"{label}:{reader.line_num}: {why}") from None
+            raise _unreadable(label, reader.line_num, error) from None
+
+
+def read_names(path: Path, label: str) -> list[str]:
+    """Return the names of the columns of a CSV file, from its first line.
+
+    Raises:
+        BadInput: it is no CSV file with commas.
+    """
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        try:
+            return _names(next(csv.reader(file), []), label)
+        except (csv.Error, UnicodeDecodeError) as error:
+            raise _unreadable(label, 1, error) from None
+
+
+def _unreadable(label: str, line: int, error: Exception) -> BadInput:
+    why = "it is no UTF-8" if isinstance(error, UnicodeDecodeError) else error
+    return BadInput(f"{label}:{line}: {why}")
+
+
+def _names(row: Sequence[str], label: str) -> list[str]:
+    """Return the names in a first row; of one that nothing separates refuse another separator by its name."""
+    names = [name.strip() for name in row]
+    if len(names) == 1:
+        for mark, word in SEPARATORS.items():
+            if mark in names[0]:
+                raise BadInput(f"{label}: its columns are separated by {word}, must be by commas")
+    return names
+
+
+def _miscounted(row: Sequence[str], names: Sequence[str]) -> str:
+    """Say that a row has too many or too few cells, and what makes twice as many."""
+    said = f"{len(row)} cells, must be {len(names)} as in the first row"
+    n_whole = sum(cell.strip().lstrip("+-").isdigit() for cell in row)
+    is_decimal_comma = len(row) > len(names) and 2 * n_whole > len(row)
+    return f"{said}; numbers must have a decimal point, no comma" if is_decimal_comma else said
 
 
 def _outcome(place: str, cells: Mapping[str, str]) -> dict[str, Any]:
@@ -478,5 +515,6 @@ def read_number(place: str, name: str, text: str) -> float:
     except (ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
-        raise BadInput(f"{place}: {name} = {shown(text)}, must be a finite number, decimal or as 0x1.8p+3")
+        how = "with a decimal point" if "," in text else "decimal or as 0x1.8p+3"
+        raise BadInput(f"{place}: {name} = {shown(text)}, must be a finite number, {how}")
     return number

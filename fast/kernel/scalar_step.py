@@ -358,8 +358,8 @@ def step(particle, limit, scene, anchors):
     # the start is judged all the same.
     ahead = limit * (1.0 + NEAR) if limit > 0.0 else LEAST
     code, s = first_event(particle, ahead, scene, anchors)
-    if limit == 0.0 and is_hit(code):
-        code = HORIZON
+    if limit == 0.0 and (is_hit(code) or code in (SLIDING, MOUTH_EDGE, CORNER)):
+        code = HORIZON  # it has arrived, even where it could not fly on
     if is_lost(code) and limit > 0.0 and s > limit * (1.0 - CLOSE):
         if s <= limit * (1.0 + CLOSE):
             code = NEAR_HORIZON

@@ -32,7 +32,7 @@ from conformance.audit.claims.finite_energy import (
 )
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import Mean, mean, share
-from mushrooms.figures.energies import draw, draw_adiabatic, gathered, with_residuals
+from mushrooms.figures.energies import ROOM, draw, draw_adiabatic, gathered, with_residuals
 from mushrooms.figures.orbits import draw_map, draw_section
 from mushrooms.figures.style import (
     BLACK,
@@ -148,7 +148,8 @@ def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
     bars = gathered(sample.gain, float(found.peak[1] ** 0.5))
     draw(axes, rest, bars, found)
     axes.set_title(f"{sample.run.scene}, E0 = {power(sample.run.energy)}, {sample.n:,} particles")
-    draw_adiabatic(axes, theory.energies(scene_of(sample.run)), bars.edges, "sharp")
+    highest = draw_adiabatic(axes, theory.energies(scene_of(sample.run)), bars.edges, "sharp")
+    axes.set_ylim(0, max(axes.get_ylim()[1], ROOM * highest))
 
 
 def capture_times(panels: Panels, *samples: Sample) -> None:
@@ -393,16 +394,16 @@ ALL = (
     Picture(
         "X1",
         "Energies after one cycle, fixed cap. In theory (orange) the never captured share one energy,"
-        " dashed; black: the theory at this energy, with diffusion and lags from frozen tables and nothing "
-        "fitted.",
+        " dashed. The other curve is the theory at this energy, with diffusion and lags from frozen tables"
+        " and nothing fitted.",
         energies,
         partial(with_residuals, 2),
         (ACW, CW),
     ),
     Picture(
         "X2",
-        "Energies after one cycle, moving cap; as above. The orange density is infinite at its right "
-        "end, the caustic of N5.",
+        "Energies after one cycle, moving cap; as above. The orange density is infinite at its right"
+        " end, the caustic of N5; drawn is its mean over one bar.",
         energies,
         partial(with_residuals, 2),
         ("moving-cap@1e6", MAIN_RUN),

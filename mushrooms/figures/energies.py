@@ -2,7 +2,9 @@
 
 The data are s = ln(E/E0) of the particles that take part, as (n, K) arrays: n particles after each of K
 cycles. A run too large for memory gives them block by block. Below a histogram stands its difference from
-the theory at this energy. For scenes without measured rates the limit of high energies is drawn.
+the theory at this energy. For scenes without measured rates the limit of high energies is drawn. All curves
+of theory in one panel are of one energy. A density is drawn as its mean over the width of one bar: at the
+middle of a bar it is the height that theory expects of this bar, and it is finite everywhere.
 """
 
 from __future__ import annotations
@@ -35,6 +37,7 @@ N_PLACES = 1500
 N_LINES = 12  # single particles drawn beside the mean
 N_MARKS = 60  # cycles at which a mean is drawn, at most
 ENOUGH = 10_000  # particles that say where the bars go
+ROOM = 1.08  # height of a panel, by that of the highest curve or bar with its error
 LEAST_EXPECTED = 5.0  # particles in a bin, to speak of standard errors
 TAIL = 0.0005  # left out at either side
 LEAST_SPAN = 1e-12  # of a histogram: what is less is rounding
@@ -167,7 +170,7 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
         above.plot(
             cycles[shown], line, color=BLACK, linewidth=1.5, label=f"theory, m1 = {line[1]:.4f} a cycle"
         )
-        spread = float(theory.predict(scene, 6).sd) * np.sqrt(cycles[shown])
+        spread = np.array([0.0, *((k * one.variance) ** 0.5 for k, one in predictions if one is not None)])
         for edge, label in ((line - spread, "theory ± its sd"), (line + spread, "_")):
             above.plot(cycles[shown], edge, color=BLACK, linewidth=0.9, linestyle=":", label=label)
     above.set(xlabel="cycle of the walls", ylabel="ln(E/E0)", title=_title(scene, energy, bars, n_particles))
@@ -188,36 +191,52 @@ def _title(scene: Scene, energy: float, bars: Gathered, n_particles: int | None)
 
 def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
     """Draw a histogram, with the limit of high energies if theory covers the scene."""
-    heights, edges = _bars(axes, bars), bars.edges
-    axes.set(xlabel=AXIS, ylabel="density", xlim=(edges[0], edges[-1]), ylim=(0, 1.3 * float(heights.max())))
-    axes.locator_params(axis="x", nbins=6)
+    highest, edges = _bars(axes, bars), bars.edges
     with suppress(*NO_THEORY):
         if isinstance(scene, Mushroom) and begins_widest(scene):
-            draw_adiabatic(axes, theory.energies(scene), bars.edges, "at high energies")
+            theirs = draw_adiabatic(axes, theory.energies(scene), edges, "at high energies")
+            highest = max(highest, theirs)
+    axes.set(xlabel=AXIS, ylabel="density", xlim=(edges[0], edges[-1]), ylim=(0, ROOM * highest))
+    axes.locator_params(axis="x", nbins=6)
 
 
-def draw_adiabatic(axes: Axes, limit: theory.Energies, edges: FloatArray, name: str) -> None:
-    """Draw the energies of the adiabatic theory: a density of the captured, a line for the others."""
+def draw_adiabatic(axes: Axes, limit: theory.Energies, edges: FloatArray, name: str) -> float:
+    """Draw the energies of the adiabatic theory: a density of the captured, a line for the others.
+
+    Returns:
+        The greatest density drawn.
+    """
+    highest = 0.0
     if limit.p_nc < 1:
-        _draw_density(
+        highest = _draw_density(
             axes,
             limit.captured_below,
             edges,
-            N_PLACES,
             color=ORANGE,
             linewidth=1.4,
             label=f"theory, captured, {name}",
         )
     if limit.p_nc > 0:
         draw_never_captured(axes, float(limit.s_nc))
+    return highest
 
 
 def _draw_density(
-    axes: Axes, below: Callable[[FloatArray], FloatArray], edges: FloatArray, n: int, **style: Any
-) -> None:
-    """Draw the density between n places of what has these shares below a place."""
-    x = np.linspace(edges[0], edges[-1], n)
-    axes.plot((x[1:] + x[:-1]) / 2, np.diff(below(x)) / np.diff(x), **style)
+    axes: Axes, below: Callable[[FloatArray], FloatArray], edges: FloatArray, **style: Any
+) -> float:
+    """Draw a density as its mean over the width of a bar, and return the greatest.
+
+    Args:
+        axes: where.
+        below: returns the shares below places.
+        edges: of the bars, equally wide.
+        style: of the line.
+    """
+    x = np.linspace(edges[0], edges[-1], N_PLACES)
+    half = (edges[1] - edges[0]) / 2
+    density = (below(x + half) - below(x - half)) / (2 * half)
+    axes.plot(x, density, **style)
+    return float(density.max())
 
 
 def draw_never_captured(axes: Axes, place: float) -> None:
@@ -227,33 +246,32 @@ def draw_never_captured(axes: Axes, place: float) -> None:
 
 def draw(axes: Axes, rest: Axes | None, bars: Gathered, found: theory.FiniteEnergy) -> None:
     """Draw a histogram, the theory over it, and residuals into `rest` if there is one."""
-    heights, edges = _bars(axes, bars), bars.edges
+    top, edges = _bars(axes, bars), bars.edges
     shares = np.diff(found.cdf(edges))
     if rest is None:
         axes.set(xlabel=AXIS)
     else:
         _residuals(rest, bars.counts, shares * bars.n, edges)
-    _draw_density(
+    theirs = _draw_density(
         axes,
         found.cdf,
         edges,
-        4 * N_BARS + 1,  # finer, single atoms of the theory would show
         color=BLACK,
         linewidth=1.3,
         label=f"theory at this energy, peak {found.peak[1] ** 0.5:.4f} wide",
     )
-    top = 1.3 * max(float(heights.max()), float((shares / np.diff(edges)).max()))  # spikes are cut
-    axes.set(xlim=(edges[0], edges[-1]), ylim=(0, top), ylabel="density")
+    axes.set(xlim=(edges[0], edges[-1]), ylim=(0, ROOM * max(top, theirs)), ylabel="density")
 
 
-def _bars(axes: Axes, bars: Gathered) -> FloatArray:
-    """Draw densities with their standard errors, and return them."""
+def _bars(axes: Axes, bars: Gathered) -> float:
+    """Draw densities with their standard errors, and return the highest end of an error bar."""
     unit = bars.n * np.diff(bars.edges)
     heights: FloatArray = bars.counts / unit
     axes.stairs(heights, bars.edges, fill=True, color=SKY, label="simulation")
     places = (bars.edges[1:] + bars.edges[:-1]) / 2
-    axes.errorbar(places, heights, np.sqrt(bars.counts) / unit, fmt="none", ecolor=BLUE, elinewidth=0.7)
-    return heights
+    errors = np.sqrt(bars.counts) / unit
+    axes.errorbar(places, heights, errors, fmt="none", ecolor=BLUE, elinewidth=0.7)
+    return float((heights + errors).max())
 
 
 def _residuals(rest: Axes, counts: IntArray, expected: FloatArray, edges: FloatArray) -> None:

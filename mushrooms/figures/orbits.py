@@ -15,6 +15,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
+from matplotlib.transforms import ScaledTranslation
 from mpmath import fp
 
 import theory
@@ -29,7 +30,6 @@ from scene.refusal import BadInput, shown
 
 N_FRAMES = 96
 TRAIL = 6  # collisions that the animation's particle draws behind it
-N_PLACES = 400
 CAPTURED, FREE = plots.BLUE, plots.ORANGE
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 
@@ -73,7 +73,9 @@ def trajectory(orbit: FollowedOrbit) -> Figure:
     bar.ax.set_ylim(0, len(points) - 1)
     axes.set(aspect="equal", xlabel="x [length]", ylabel="y [length]", title=_title([orbit]))
     axes.margins(0.08)
-    figure.legend(loc="outside lower center", ncols=3)
+    # Half an inch below the axes: a wide table leaves much room between them and the end of the figure.
+    below = axes.transAxes + ScaledTranslation(0, -0.5, figure.dpi_scale_trans)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0), bbox_transform=below, ncols=3)
     return figure
 
 
@@ -303,13 +305,16 @@ def exponents(
 
 
 @rc_context(plots.STYLE)
-def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAMES) -> None:
+def write_animation(
+    orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAMES, progress: tables.Progress | None = None
+) -> None:
     """Write a GIF of the walls in motion and the particle with its last flights behind it.
 
     Args:
         orbit: shown from its start to its last collision, at frames evenly spaced in time.
         file: open for binary writing.
         n_frames: number of frames.
+        progress: called with the number of frames that are drawn, and with that of all.
     """
     [orbit] = _check_orbits(orbit)
     states = orbit.states()
@@ -327,4 +332,4 @@ def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAM
         dot.set_data(*places[k : k + 1].T)
         axes.set_title(f"{plots.plain(orbit.scene.name)}   {name} = {(times[k] - times[0]) / unit:.2f}")
 
-    tables.write_frames(orbit.scene, axes, times.tolist(), show, file)
+    tables.write_frames(orbit.scene, axes, times.tolist(), show, file, progress)

@@ -19,6 +19,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 BLUE, SKY, ORANGE, BLACK, GREY, GREEN = "#0072B2", "#A6CEE9", "#D55E00", "#1A1A1A", "#8C8C8C", "#009E73"
+NOTEBOOK_DPI = 100
 LONGEST, MOST_LINES = 40, 3  # letters of a line, and lines, of a name in a title
 STYLE: dict[str, Any] = {
     "font.family": "sans-serif",
@@ -58,11 +59,20 @@ def power(number: float) -> str:
     return rf"${factor}10^{{{int(exponent)}}}$"
 
 
+class NotebookFigure(Figure):
+    """A figure that a notebook shows: pyplot, which it asks for others, never hears of ours."""
+
+    def _repr_png_(self) -> bytes:
+        file = io.BytesIO()
+        save(self, file, ".png", dpi=NOTEBOOK_DPI)
+        return file.getvalue()
+
+
 def new_figure(
     width: float, height: float, n_rows: int = 1, n_columns: int = 1, **options: Any
 ) -> tuple[Figure, Any]:
     """Return a figure [inches] and its axes (an array when there are several), as `Figure.subplots` does."""
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = NotebookFigure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure, figure.subplots(n_rows, n_columns, **options)
 

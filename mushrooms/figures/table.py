@@ -19,6 +19,7 @@ from mushrooms.figures import style as plots
 from scene import BadInput, Scene, State, check_scene
 from scene.geometry import table_at
 
+Progress = Callable[[int, int], None]
 SUFFIXES = (".svg", ".png", ".pdf", ".gif")
 N_PHASES = 6
 N_CHORDS = 14
@@ -92,13 +93,14 @@ def new_strip(scene: Scene, width: float, max_height: float) -> Figure:
     return figure
 
 
-def write_picture(scene: Scene, suffix: str, file: BinaryIO) -> None:
+def write_picture(scene: Scene, suffix: str, file: BinaryIO, progress: Progress | None = None) -> None:
     """Write a picture of the scene.
 
     Args:
         scene: any valid table.
         suffix: ".svg", ".png" or ".pdf": the table at each phase, with chords; ".gif": the walls in motion.
         file: open for binary writing.
+        progress: see `write_frames`.
     """
     times, name = phases(scene, N_FRAMES), plots.plain(scene.name)
     if suffix != ".gif":
@@ -111,7 +113,7 @@ def write_picture(scene: Scene, suffix: str, file: BinaryIO) -> None:
     def show(k: int) -> None:
         axes.set_title(f"{name}   " + (f"t/T = {times[k] / scene.period:.2f}" if scene.period else "static"))
 
-    write_frames(scene, axes, times, show, file)
+    write_frames(scene, axes, times, show, file, progress)
 
 
 @rc_context(plots.STYLE)
@@ -129,7 +131,12 @@ def new_slide(scene: Scene) -> Axes:
 @rc_context(plots.STYLE)
 @plots.any_letters()
 def write_frames(
-    scene: Scene, axes: Axes, times: Sequence[float], show: Callable[[int], None], file: BinaryIO
+    scene: Scene,
+    axes: Axes,
+    times: Sequence[float],
+    show: Callable[[int], None],
+    file: BinaryIO,
+    progress: Progress | None = None,
 ) -> None:
     """Write a GIF of the walls at these times [time].
 
@@ -139,11 +146,14 @@ def write_frames(
         times: one for each frame.
         show: receives the number of a frame, and draws what moves besides the walls.
         file: open for binary writing.
+        progress: called with the number of frames that are drawn, and with that of all.
     """
+    tell = progress or (lambda _n_done, _n: None)
     lines = draw_walls(axes, scene, times[0], color=plots.BLUE, linewidth=2)
     canvas: Any = axes.figure.canvas
     frames = []
     for k, t in enumerate(times):
+        tell(k, len(times))
         show(k)
         for line, points in zip(lines, walls(scene, t), strict=True):
             line.set_data(*points)

@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from mpmath import fp
 
 from conformance import vectors
 from conformance.grading.agreement import FAIR, SHARP, middle
@@ -21,6 +22,7 @@ from conformance.suite.session import outcomes_of
 from mushrooms.figures import style as plots, table as draw
 from mushrooms.reports.page import embed, render
 from scene import BadInput, Collision, Horizon, Outcome, Scene, State, from_data
+from scene.geometry import table_at
 
 N_FAILED, N_SHARPEST = 8, 4  # cases drawn: those that failed, or else the least precise that passed
 MAX_LISTED = 200
@@ -129,6 +131,8 @@ LEGEND = (
     (plots.GREY, "walls at the start"),
     (plots.BLACK, "walls at the certified hit"),
 )
+N_CHORDS = 180  # of an arc, as `Table.outline` has it
+LEAST_SEEN = 1e-12  # of the table's size: two places that are closer are drawn as one
 CLOSE = 0.06  # half the width of the close-up, of the table's size; more where the two hits lie further apart
 # The certified path and the given one: colour, width and name.
 STROKES = ((plots.ORANGE, 4.0, "certified"), (plots.BLUE, 1.5, "given"))
@@ -155,11 +159,65 @@ def paths(result: Result, vector: vectors.Vector) -> bytes:
     return plots.svg(figure)
 
 
-def draw_step(scene: Scene, state: State, truth: Collision | Horizon, given: Mapping[str, Any]) -> bytes:
-    """Draw one step as SVG: where it leads, and where it was said to; the whole table, and close up."""
+@rc_context(plots.STYLE)
+def draw_step(
+    scene: Scene, state: State, truth: Collision | Horizon, given: Mapping[str, Any], place: str
+) -> bytes:
+    """Draw one step as SVG: where it leads, and where it was said to; the whole table, and close up.
+
+    The close-up is as large as the distance of both places, so that this is seen. The title names the field
+    that is off most. Velocities are compared with the speed, places with the table's size.
+
+    Args:
+        scene: of the step.
+        state: where it begins.
+        truth: its certified end.
+        given: its end as it was given; fields may be missing.
+        place: of the step, such as step 1.
+    """
+    size = float(np.ptp(np.hstack(draw.walls(scene, truth.t)), axis=1).max())
+    certified = {**_fields(truth), "t": truth.t}
+    far = math.hypot(given["x"] - truth.x, given["y"] - truth.y)
     figure = _draw(scene, state, truth.t, ([_fields(truth)], [dict(given)]), 0, "-")
-    figure.axes[0].legend(loc="best")
+    figure.axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+    if far > LEAST_SEEN * size:
+        _close_up(figure.axes[1], [_fields(truth), given], 2.0 * far)
+        _bend_arcs(figure.axes[1], scene, (state.t, truth.t), truth, 8.0 * far)
+    figure.axes[1].set_title("close to the end")
+    figure.axes[1].locator_params(nbins=4)
+    speed = math.hypot(truth.vx, truth.vy)
+    scales = {"t": abs(truth.t), "x": size, "y": size, "vx": speed, "vy": speed}
+    figure.suptitle(f"{place}: {_worst_field(certified, given, scales, getattr(truth, 'wall', None))}")
     return plots.svg(figure)
+
+
+def _bend_arcs(
+    axes: Axes, scene: Scene, times: Sequence[float], at: Collision | Horizon, reach: float
+) -> None:
+    """Draw the arcs near a place by points as close as a close-up needs: its chords would miss the hit."""
+    if at.y <= reach:
+        return  # the base is near too, and drawn by the same line
+    arcs = [line for line in axes.lines if np.size(line.get_xdata()) > N_CHORDS]
+    for line, t in zip(arcs, times, strict=False):
+        r = float(table_at(fp, scene, t).r)
+        middle = math.atan2(at.y, at.x)
+        angles = np.linspace(middle - reach / r, middle + reach / r, N_CHORDS)
+        line.set_data(r * np.cos(angles), r * np.sin(angles))
+
+
+def _worst_field(
+    certified: Mapping[str, float], given: Mapping[str, Any], scales: Mapping[str, float], wall: str | None
+) -> str:
+    """Say which field of a step is off most, by its scale; a wrong wall before any number."""
+    if given.get("wall") not in (None, wall):
+        return f"wall = {given['wall']}, must be {wall}"
+
+    def error(name: str) -> float:
+        return abs(float(given[name]) - certified[name]) / (scales[name] or 1.0)
+
+    worst = max((name for name in scales if name in given), key=error)
+    gap = given[worst] - certified[worst]
+    return f"{worst} = {given[worst]:.10g}, must be {certified[worst]:.10g}: off by {gap:.2g}"
 
 
 @rc_context(plots.STYLE)

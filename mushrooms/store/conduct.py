@@ -179,6 +179,7 @@ ROOM = 2**12  # particles of a new run's block, however few it has: it may be wi
 BLOCK_BYTES = 2**26  # on disk; in memory several times that
 LANES_OF_A_THREAD = 128  # particles that a thread needs to be quick
 MOST_BLOCKS = 10**6
+MOST_CHUNKS = 200  # of a block's array along the cycles: each is a file
 PROBED = 4  # particles followed again before a run is gone on with
 MARKER_BYTES = 2**16  # of a block's files beside its chunks, at most
 CLOCK = time.monotonic
@@ -238,6 +239,12 @@ def open_or_create(
         _check_growth(folder, "particles", found["particles"], n_particles)
         if not resume:
             raise BadInput(f"output {str(folder)!r} holds this run: --resume goes on with it")
+        most = MOST_CHUNKS * found["cycles_of_a_chunk"]
+        if spec.n_cycles > most:
+            raise BadInput(
+                f"output {str(folder)!r}: --cycles = {spec.n_cycles}, must be at most {most} for a run that"
+                f" began with {found['cycles_of_a_chunk']}: more need another folder"
+            )
     if n_particles > MOST_BLOCKS * found["block"]:
         least = -(-n_particles // MOST_BLOCKS)
         raise BadInput(f"--block = {found['block']}: {n_particles} particles need blocks of at least {least}")

@@ -6,34 +6,28 @@ A block is finished when its marker is there: a small sealed file, written after
 holds their SHA-256. A block without a marker, or whose arrays do not have these sums, is followed again. So
 neither the moment at which a process ends nor damage to a file can change a result.
 
-A finished run is exported as one table, block by block, with the same bits. A row is a particle. What it has
-for each cycle, minimum of nu or wall stands in columns of its own, counted from 1, or named by the wall:
-cycle_energies_1, t_in_1_1, wall_counts_arc.
+`open_run` is the one way to read a finished run: whatever draws, exports or audits it goes through there, and
+every number of the run is held to its checksum first.
 """
 
 import hashlib
 import json
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import partial
-from itertools import product
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import zarr
 
 from conformance.files import sealed, unsealed, write_file
 from fast import Ensemble, Paused
-from mushrooms.output import TABLES, check_file
+from mushrooms.output import Watch, progress_bar
 from mushrooms.store.spec import (
     FIELDS,
-    LANES,
     SCHEMA,
-    WALLS,
     Array,
-    Arrays,
     RunSpec,
     Shape,
     columns,
@@ -50,6 +44,8 @@ DESCRIPTION = "run.marker"  # among the markers: the group's attributes once mor
 # What zarr raises of damaged metadata and chunks.
 UNREADABLE = (ArithmeticError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
 
+
+OURS = {"seal", "cycles_of_a_chunk"}  # attributes that no Zarr group of others has
 
 DIGESTED = Ensemble._fields[1:-2]  # neither energy0 nor times
 
@@ -233,14 +229,17 @@ class StoredRun:
                     return array
         raise self._damaged(number)
 
-    def load(self) -> None:
-        """Count the blocks by their markers alone: what is read later is checked then.
+    def load(self, on_progress: Callable[[int, int], None]) -> None:
+        """Count the blocks of a finished run, each array of which is as it was written.
+
+        Args:
+            on_progress: called with the number of particles that are checked, and with that of all.
 
         Raises:
-            BadInput: particles are missing.
+            BadInput: particles are missing, or a block is damaged.
         """
         for number in range(self.shape.n_blocks):
-            with suppress(BadInput):
+            if self._path(number).exists():
                 marker = self._marker(number)
                 self._count(marker, RunTally(particles=marker.rows))
         if any(self.lacking()):
@@ -248,6 +247,10 @@ class StoredRun:
             raise BadInput(
                 f"run {str(self.folder)!r} has {there} of {n} particles: go on with {self.command}"
             )
+        for number in range(self.shape.n_blocks):
+            on_progress(number * self.shape.block, self.shape.n_particles)
+            for name in self.shape.names:
+                self.read(number, name)
 
     def part(self, number: int, name: str) -> Array:
         """Return a field of `fast.Ensemble` for the particles of a block; its bytes are the same."""
@@ -347,21 +350,24 @@ def attributes_of(folder: Path) -> dict[str, Any]:
         BadInput: the folder holds no run, or both are damaged.
     """
     content = unsealed(folder / MARKERS / DESCRIPTION)
-    if content is not None:
-        return dict(json.loads(content))
+    described = {} if content is None else dict(json.loads(content))
+    if "schema" in described:  # else it is another sealed file, in the wrong place
+        return described
     with suppress(*UNREADABLE):
         found = dict(zarr.open_group(folder / GROUP, mode="r").attrs)
         if found.pop("seal", None) == _digest(found):
             return found
-    why = "its description is damaged" if is_run(folder) else f"it holds no {GROUP}"
+    why = "its description is damaged"
+    if not is_run(folder):
+        why = f"it holds no {GROUP}: nothing was stored there by mushrooms simulate --out"
     raise BadInput(f"run {str(folder)!r}: {why}")
 
 
 def open_run(folder: Path) -> StoredRun:
-    """Return a finished run, to be read.
+    """Return a finished run, to be read: all of it is as it was written.
 
     Raises:
-        BadInput: the folder holds none, one of another schema, or one that is not finished.
+        BadInput: the folder holds none, one of another schema, one that is not finished, or a damaged one.
     """
     found = attributes_of(folder)
     if found["schema"] != SCHEMA:
@@ -369,43 +375,25 @@ def open_run(folder: Path) -> StoredRun:
     spec = spec_of(found)
     shape = shape_of(spec, found["particles"], found["block"], found["cycles_of_a_chunk"])
     run = StoredRun(folder, spec, shape, found["command"])
-    run.load()
+    with progress_bar() as bar:
+        run.load(Watch(bar, f"checking {folder}", "particles").update)
     return run
 
 
-def write_npz(run: StoredRun, file: BinaryIO) -> None:
-    """Write the fields of `fast.Ensemble` (times left out) as numpy reads them."""
-    fields = run.ensemble(run.shape.n_particles)._asdict()
-    held = {
-        name: array for name, array in fields.items() if np.size(array) and name not in ("seconds", "threads")
-    }
-    np.savez(file, **held)
-
-
-def _tables(run: StoredRun) -> Iterator[Arrays]:
-    """Yield each block as columns by their names."""
-    for number in range(run.shape.n_blocks):
-        first = number * run.shape.block
-        table: Arrays = {"particle": np.arange(first, first + run.shape.rows(number))}
-        for name in [name for name in run.shape.names if name != LANES]:
-            array = run.read(number, name)
-            for place in product(*map(range, array.shape[1:])):
-                words = [WALLS[i] if FIELDS[name].dims[-1] == "wall" else str(i + 1) for i in place]
-                at: Any = (slice(None), *place)
-                table["_".join([name, *words])] = array[at]
-        yield table
-
-
-def export_run(run: Path, to: Path) -> None:
-    """Write a finished run as one table.
+def folder_of(path: Path) -> Path | None:
+    """Return the folder of the run that a path is: that folder, or the Zarr group in it; None if it is none.
 
     Raises:
-        BadInput: a block is damaged, or pyarrow is not installed.
+        BadInput: it is a group of ours without the checksums beside it.
     """
-    check_file(to, (".parquet", ".csv", ".npz"))
-    found = open_run(run)
-    if to.suffix == ".npz":
-        write_file(to, partial(write_npz, found))
-    else:
-        write_file(to, partial(TABLES[to.suffix], _tables(found)))
-    print(to)
+    for folder in (path, path.parent):
+        if path in (folder, folder / GROUP) and any((folder / MARKERS).glob("*.marker")):
+            return folder
+    group = path / GROUP if (path / GROUP).is_dir() else path
+    names: set[str] = set()
+    with suppress(*UNREADABLE):
+        names = set(zarr.open_group(group, mode="r").attrs)
+    if OURS & names:
+        where = str(group.parent / MARKERS)
+        raise BadInput(f"run {str(path)!r}: its checksums, the folder {where!r}, are missing")
+    return None

@@ -147,11 +147,13 @@ class Theory(NamedTuple):
 
     Attributes:
         m1, p_nc: predicted.
+        variance: of ln(E/E0) after the run's cycles, for each of them.
         m1_error, p_nc_error: how far that may be off; None if that is unknown.
     """
 
     m1: float
     p_nc: float
+    variance: float
     m1_error: float | None = None
     p_nc_error: float | None = None
 
@@ -264,7 +266,8 @@ def predicted(spec: RunSpec) -> Theory | None:
     """Return what theory says of a run; None where it covers nothing.
 
     What finite energy adds to a cycle goes as E^(-1/2) with the energy at which the cycle begins. Cycles are
-    independent, so its mean falls by the mean of exp(-s / 2) each.
+    independent, so its mean falls by the mean of exp(-s / 2) each. Mean, share and variance of a run are all
+    of its energy, or all of the limit.
     """
     if not isinstance(spec.scene, Mushroom) or not begins_widest(spec.scene):
         return None
@@ -272,15 +275,16 @@ def predicted(spec: RunSpec) -> Theory | None:
         limit = theory.predict(spec.scene, DIGITS)
     except NO_THEORY:
         return None
-    m1, p_nc = float(limit.m1), float(limit.p_nc)
+    m1, p_nc, variance = float(limit.m1), float(limit.p_nc), float(limit.sd) ** 2
     there = known(spec.scene, spec.energy)
     if there is None:
-        return Theory(m1, p_nc)
+        return Theory(m1, p_nc, variance)
     slower, left = there.mean_of_exp(-0.5), there.theory_error
     share = math.fsum(slower**k for k in range(spec.n_cycles)) / spec.n_cycles
     return Theory(
         m1 + share * (there.mean_s - m1),
         p_nc + share * (there.p_nc - p_nc),
+        variance + share * (there.variance_s - variance),
         share * left.mean_s,
         share * left.p_nc,
     )

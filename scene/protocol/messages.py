@@ -13,7 +13,7 @@ from typing import Annotated, Any, get_args
 
 import msgspec
 
-from scene.load import state_omega_or_period
+from scene.load import limit_definitions
 from scene.states import Horizon, Rejected, State, Undecided, Undefined
 from scene.tables import Scene, Wall
 
@@ -213,11 +213,14 @@ def json_schema() -> dict[str, Any]:
     _, definitions = msgspec.json.schema_components(
         [*requests, *outcomes, *answers, Scene], ref_template="#/$defs/{name}"
     )
-    state_omega_or_period(definitions)
+    limit_definitions(definitions)
     published = {name: name.removesuffix("Request") for name in definitions}
     definitions = {published[name]: {**kind, "title": published[name]} for name, kind in definitions.items()}
     tables = ("Cap", "Stem", "Mushroom")
     scene = {"anyOf": [_reference(name) for name in tables]}
+    definitions["Trajectory"]["properties"]["collisions"]["minimum"] = 0
+    for field in ("collisions", "repeat"):
+        definitions["Time"]["properties"][field]["minimum"] = 1
     for request in (StepRequest, TrajectoryRequest, FlowRequest, TimeRequest):
         definitions[published[request.__name__]]["properties"]["scene"] = scene
     # A step is answered by an outcome that carries the seq of the request (null where it had none).

@@ -40,6 +40,7 @@ TOUCHED = {
 }
 REST = {"scene": {"table": "cap", "r": 2.0}, "state": {**START, "vx": 0.0, "vy": 0.0}}
 REFUSED = {"outcome": "rejected"}
+ARRIVED = {"outcome": "horizon", "t": 0.0}
 OPEN = {"outcome": "undecided"}
 
 
@@ -54,6 +55,10 @@ def _at(x: float, y: float, vx: float, vy: float, wall: str | None = None) -> Li
     return {"state": {"t": 0.0, "x": x, "y": y, "vx": vx, "vy": vy, "wall": wall}}
 
 
+def _states(*numbers: Any) -> Line:
+    return {"states": [_at(*numbers)["state"]]}
+
+
 def _undefined(reason: str) -> Line:
     return {"outcome": "undefined", "reason": reason}
 
@@ -64,6 +69,19 @@ EDGES: list[tuple[Line, list[Line]]] = [
     (asked("step", t_end=math.nextafter(5.0, 0.0)), [REFUSED]),
     (asked("step", t_end=5.0, state={**START, "y": 2.0}), [REFUSED]),
     (asked("step", t_end=5.0, state={**START, "y": -0.0, "wall": "base"}), [{**HERE, "y": 0.0}]),
+    # What slides along a wall, or is in a corner, has arrived as well; what moves into a wall is refused.
+    (asked("step", **_at(0.25, 0.0, 1.0, 0.0, "base"), t_end=0.0), [{"outcome": "horizon", "t": 0.0}]),
+    (asked("flow", **_states(0.25, 0.0, 1.0, 0.0, "base"), t_end=0.0), [REFUSED, {"states": [ARRIVED]}]),
+    (
+        asked("trajectory", **_at(0.25, 0.0, 1.0, 0.0, "base"), t_end=0.0, collisions=3),
+        [{"steps": [ARRIVED]}],
+    ),
+    (asked("step", **_at(1.0, 0.0, 1.0, 1.0, "base"), t_end=0.0), [ARRIVED, OPEN]),
+    (asked("step", **_at(0.25, 0.0, 1.0, -1.0, "base"), t_end=0.0), [REFUSED]),
+    (asked("step", scene=MUSHROOM, **_at(0.0625, 0.0, 1.0, 0.0), t_end=0.0), [ARRIVED, OPEN]),
+    (asked("step", scene=MUSHROOM, **_at(0.75, 0.0, 1.0, 0.0), t_end=0.0), [ARRIVED, OPEN]),
+    # No step is asked for, so that none need be defined.
+    (asked("trajectory", **_at(0.25, 0.0, 1.0, 0.0, "base"), collisions=0), [{"steps": []}]),
     (asked("trajectory", collisions=0), [{"steps": []}]),
     (asked("trajectory", collisions=3, t_end=5.0), [{"steps": [HERE]}]),
     (asked("trajectory", collisions=3, t_end=1.0), [REFUSED, {"steps": [REFUSED]}]),

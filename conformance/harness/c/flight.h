@@ -121,12 +121,12 @@ static double beginning(const Flight *flight, int wall, double begin) {
     return bend ? fmax(begin, 2 * gap(flight, wall, 0).slope / bend) : INFINITY;
 }
 
-static int is_in_cap(Flight *flight) {
+static int is_in_cap(Flight *flight, double horizon) {
     State from = flight->from;
     if (flight->table->kind != MUSHROOM) return flight->table->kind == CAP;
     if (from.wall != NOWHERE) return from.wall == ARC || from.wall == BASE;
-    if (from.y == 0 && from.vy == 0) stop(flight, UNDECIDED, "it flies along the mouth");
-    return from.y > 0 || (from.y == 0 && from.vy > 0);
+    if (from.y == 0 && from.vy == 0 && horizon > 0) stop(flight, UNDECIDED, "it flies along the mouth");
+    return from.y > 0 || (from.y == 0 && from.vy >= 0);
 }
 
 static int is_on_base(Flight *flight, double s) {
@@ -157,7 +157,7 @@ static void check_inside(Flight *flight, int inside) {
     }
 }
 
-static void check_wall(Flight *flight) {
+static void check_wall(Flight *flight, double horizon) {
     int wall = flight->from.wall, kind = flight->table->kind;
     double y = flight->from.y;
     if (wall == NOWHERE) return;
@@ -177,15 +177,16 @@ static void check_wall(Flight *flight) {
     if (off > 0) stop(flight, UNDECIDED, "state.wall: the state may be on that wall within rounding of its phase");
     if (g.slope < -SLACK * U * fabs(flight->from.t) * curvature(flight, wall))
         stop(flight, REJECTED, "state.wall: starts on it and moves into it");
+    if (wall == BASE && g.slope == 0 && horizon == 0) return; /* it slides, and has arrived */
     if (g.slope <= 0) stop(flight, UNDECIDED, "it rests on its wall, or does within rounding of its phase");
 }
 
 static Event first_hit(Flight *flight, double horizon) {
     State from = flight->from;
-    int inside = is_in_cap(flight);
+    int inside = is_in_cap(flight, horizon);
     double begin = 0;
     check_inside(flight, inside); /* first: a corner is one whichever way the particle moves */
-    check_wall(flight);
+    check_wall(flight, horizon);
     for (;;) {
         int leaves = inside ? from.vy < 0 : from.vy > 0;
         double level = INFINITY; /* when it reaches the level of the mouth */

@@ -62,6 +62,8 @@ static int read_knots(json_t *knots, Law *law) {
         t[0] = t[1], v[0] = v[1];
     }
     law->period = t[1] - law->start;
+    double back = law->period - t[1], lost = (t[1] - (law->period - back)) - (law->start + back);
+    if (lost != 0) return refuse("period of the knots", law->period, "a binary64 number, exactly");
     if (v[1] != first) return refuse("value of the last knot", v[1], "that of the first: no jumps");
     if (law->slope == 0) law->n_pieces = 0, law->period = 0;
     return FOUND;
@@ -87,6 +89,8 @@ static int read_law(json_t *scene, const char *name, Law *law) {
     law->high = fabs(law->mean);
     cosines = json_object_get(data, "cos"), sines = json_object_get(data, "sin");
     if ((cosines && !are_numbers(cosines)) || (sines && !are_numbers(sines))) return refuse("amplitudes", 0, "numbers");
+    size_t n = fmax(json_array_size(cosines), json_array_size(sines));
+    if (n > MAX_WAVES) return refuse("number of amplitudes", (double)n, "at most 16");
     for (int k = 1; k <= MAX_WAVES; k++) {
         Wave v = {k * omega, json_number_value(json_array_get(cosines, k - 1)),
                   json_number_value(json_array_get(sines, k - 1))};

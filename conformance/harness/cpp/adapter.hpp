@@ -28,6 +28,8 @@ constexpr double ROUNDING = 0x1p-44;  // of the table's size: nearer to a wall, 
 constexpr double ON_WALL = 0x1p-20;   // of a wall's: farther from the wall that it names, a state is not on that wall
 constexpr double LARGEST = 1e100;     // beyond it squares might overflow
 constexpr long MAX_COLLISIONS = 1000000, MAX_REPEAT = 1000;
+constexpr size_t MAX_WAVES = 16, MAX_KNOTS = 256;
+constexpr double MAX_SEQ = 0x1p53;
 
 struct Undecided : std::runtime_error {  // answered `undecided`
     using std::runtime_error::runtime_error;
@@ -53,7 +55,7 @@ inline double number_of(const json::Value& object, const char* name) {
 }
 
 inline void read_knots(const json::Value& knots, Law& law) {
-    if (knots.items.size() < 2) throw Refused("knots are missing");
+    if (knots.items.size() < 2 || knots.items.size() > MAX_KNOTS) throw Refused("there must be 2 to 256 knots");
     double t0 = 0, v0 = 0;
     for (size_t i = 0; i < knots.items.size(); i++) {
         const auto& pair = knots.items[i].items;
@@ -71,6 +73,8 @@ inline void read_knots(const json::Value& knots, Law& law) {
         t0 = t, v0 = v;
     }
     law.period = t0 - law.start;
+    double back = law.period - t0, lost = (t0 - (law.period - back)) - (law.start + back);
+    if (lost != 0) throw Refused("the period of the knots must be a binary64 number, exactly");
     if (v0 != law.mean) throw Refused("the last knot must have the value of the first");
     if (law.slope == 0) law.pieces.clear(), law.period = 0;
 }
@@ -95,6 +99,7 @@ inline Law read_law(const json::Value& scene, const char* name) {
             if (!value.is_number()) throw Refused("amplitudes must be numbers");
     }
     const auto &cosines = data.at("cos").items, &sines = data.at("sin").items;
+    if (std::max(cosines.size(), sines.size()) > MAX_WAVES) throw Refused("cos and sin have at most 16 numbers");
     for (size_t k = 1; k <= std::max(cosines.size(), sines.size()); k++) {
         double c = k <= cosines.size() ? cosines[k - 1].number : 0, s = k <= sines.size() ? sines[k - 1].number : 0;
         double frequency = static_cast<double>(k) * (by_omega ? given : other), size = std::hypot(c, s);
@@ -159,8 +164,9 @@ inline State read_state(const json::Value& data, const Scene& scene) {
 
 // Judging ----------------------------------------------------------------------------------------------
 
-inline void judge(const Scene& scene, const State& q) {
-    if (q.wall == NO_WALL && q.y == 0 && q.vy == 0) throw Undecided("it flies along the mouth");
+inline void judge(const Scene& scene, const State& q, double t_end) {
+    bool has_arrived = t_end == q.t;
+    if (q.wall == NO_WALL && q.y == 0 && q.vy == 0 && !has_arrived) throw Undecided("it flies along the mouth");
     bool in_cap = scene.is_in_cap(q);
     double size = scene.size() + std::abs(q.t) * (scene.r.slope + scene.h.slope + scene.w.slope);
     if (q.y == 0 && q.wall != NO_WALL && q.wall != BASE) throw Undecided("the state is in a corner");
@@ -183,6 +189,7 @@ inline void judge(const Scene& scene, const State& q) {
     if (scene.nu) turns += scene.nu->curvature * scene.r.high;
     if (q.wall == BASE) turns = 0;
     if (rate < -ROUNDING * std::abs(q.t) * turns) throw Refused("the state is on a wall and moves into it");
+    if (q.wall == BASE && rate == 0 && has_arrived) return;  // it slides, and need not fly on
     if (rate <= 0) throw Undecided("the state rests on its wall, or does within rounding of its phase");
 }
 
@@ -217,8 +224,8 @@ const std::string HORIZON = "\"outcome\":\"horizon\",";
 inline std::string step(const Engine& engine, const Scene& scene, State& q, double t_end, bool& goes_on) {
     goes_on = false;
     return outcome_of([&] {
-        judge(scene, q);
-        std::optional<Hit> hit = engine(scene, q);
+        judge(scene, q, t_end);
+        std::optional<Hit> hit = t_end == q.t ? std::nullopt : engine(scene, q);
         if (!hit || hit->t >= t_end) {
             double s = t_end - q.t;
             return HORIZON + place(t_end, q.x + s * q.vx, q.y + s * q.vy, q.vx, q.vy);
@@ -310,7 +317,8 @@ inline std::string answer(const std::string& name, const Engine& engine, const s
     try {
         json::Value request = json::parse(line);
         const std::string& command = request.at("cmd").text;
-        if (request.at("seq").is_integer && request.at("seq").number >= 0) seq = std::to_string(static_cast<long long>(request.at("seq").number));
+        const json::Value& number = request.at("seq");
+        if (number.is_integer && number.number >= 0 && number.number <= MAX_SEQ) seq = std::to_string(static_cast<long long>(request.at("seq").number));
         if (command == "start")
             return "{\"protocol\":1,\"name\":\"" + name +
                    "\",\"version\":\"1\",\"language\":\"C++\",\"profiles\":[\"step\",\"trajectory\",\"flow\",\"time\"],"

@@ -90,7 +90,7 @@ struct Scene {
     bool is_in_cap(const State& q) const {
         if (!is_mushroom()) return has_cap;
         if (q.wall != NO_WALL) return q.wall == ARC || q.wall == BASE;
-        return q.y > 0 || (q.y == 0 && q.vy > 0);
+        return q.y > 0 || (q.y == 0 && q.vy >= 0);
     }
     std::vector<Wall> near(bool in_cap) const {  // a mushroom's base is met at y = 0, beside the mouth
         std::vector<Wall> found = in_cap ? std::vector<Wall>{ARC} : std::vector<Wall>{LEFT, RIGHT, FLOOR};

@@ -132,7 +132,16 @@ contains
       s = s + h
     end do
     moved_on = .false.
-    if (k > 100000 .or. s == 0 .or. abs(s - base) <= 1e-12_dp * s .or. (y == 0 .and. vy == 0)) then
+    if (t_end == t) then
+      ! It has arrived, if it is inside, or on a wall that it leaves or slides along.
+      call gap(0.0_dp, f, slope)
+      if (wall == 'arc') f = slope
+      if (f > 0 .and. (y > 0 .or. (y == 0 .and. vy >= 0))) then
+        call tell('horizon,', 0.0_dp)
+        return
+      end if
+    end if
+    if (k > 100000 .or. s == 0 .or. t_end == t .or. abs(s - base) <= 1e-12_dp * s .or. (y == 0 .and. vy == 0)) then
       print '(a)', trim(seq)//',undecided,,,,,,,'
       return
     end if

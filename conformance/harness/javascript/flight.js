@@ -107,11 +107,11 @@ class Flight {
     throw new Open(`no decision within ${MAX_STEPS} steps`);
   }
 
-  isInCap() {
+  isInCap(horizon) {
     if (this.table.kind !== "mushroom") return this.table.kind === "cap";
     if (this.left !== null) return this.left === "arc" || this.left === "base";
-    if (this.y === 0 && this.vy === 0) throw new Open("it flies along the mouth");
-    return this.y > 0 || (this.y === 0 && this.vy > 0);
+    if (this.y === 0 && this.vy === 0 && horizon > 0) throw new Open("it flies along the mouth");
+    return this.y > 0 || (this.y === 0 && this.vy >= 0);
   }
 
   checkInside(walls) {
@@ -129,14 +129,14 @@ class Flight {
   // The first collision {kind, s, slope}, or {kind: "horizon"}.
   firstHit(horizon) {
     const isMushroom = this.table.kind === "mushroom";
-    let [inside, begin] = [this.isInCap(), 0];
+    let [inside, begin] = [this.isInCap(horizon), 0];
     for (;;) {
       const here = WALLS[inside ? "cap" : "stem"].filter((wall) => !(isMushroom && wall === "base"));
       const leaves = isMushroom && this.left !== "base" && (inside ? this.vy < 0 : this.vy > 0);
       const level = leaves ? max(0, -this.y / this.vy) : Infinity; // when it reaches the level of the mouth
       if (begin === 0) {
         this.checkInside(here); // first: a corner is one whichever way the particle moves
-        this.checkWall();
+        this.checkWall(horizon);
       }
       const found = this.roots(here, begin, min(horizon, level, Number.MAX_VALUE / 2) * (1 + 8 * U));
       found.push({ kind: "mouth", s: level, error: 4 * U * level, slope: this.vy });
@@ -162,7 +162,7 @@ class Flight {
     return beside > 0;
   }
 
-  checkWall() {
+  checkWall(horizon) {
     const { left, y, table } = this;
     if (left === null) return;
     const isElsewhere = left === "arc" ? y < 0 : y > 0 && table.kind === "mushroom" && left !== "base";
@@ -178,6 +178,7 @@ class Flight {
     if (off > 0) throw new Open(`the state may be on wall ${left} within rounding of its phase`);
     if (slope < -SLACK * U * abs(this.t) * this.curvature(left))
       throw new Refused(`state.wall = ${left}: starts on it and moves into it`);
+    if (left === "base" && slope === 0 && horizon === 0) return; // it slides, and has arrived
     if (slope <= 0) throw new Open("it rests on its wall, or does within rounding of its phase");
   }
 

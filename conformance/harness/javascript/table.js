@@ -5,6 +5,8 @@
 const { Fourier, BangBang, Mouth } = require("./laws.js");
 
 const N_SAMPLES = 512;
+const MAX_WAVES = 16;
+const MAX_KNOTS = 256;
 const WALLS = { cap: ["arc", "base"], stem: ["left", "right", "floor", "base"] };
 WALLS.mushroom = ["arc", "base", "left", "right", "floor"];
 
@@ -21,6 +23,13 @@ function checkFields(data, needed, allowed, name) {
   if (extra.length || missing.length) throw new Refused(`${name}: unknown or missing ${[...extra, ...missing]}`);
 }
 
+// Whether a - b is a binary64 number, exactly.
+function isExact(a, b) {
+  const difference = a - b;
+  const back = difference - a;
+  return a - (difference - back) - (b + back) === 0;
+}
+
 function readLaw(data, name) {
   if (typeof data !== "object" || data === null) return new Fourier(number(data, name));
   if (data.kind === "fourier") {
@@ -29,6 +38,7 @@ function readLaw(data, name) {
     const size = number(data[given], `${name}.${given}`);
     if (!(size > 0)) throw new Refused(`${name}.${given} = ${size}, must be > 0`);
     const [c, d] = [data.cos ?? [], data.sin ?? []].map((part) => part.map((a) => number(a, name)));
+    if (c.length > MAX_WAVES || d.length > MAX_WAVES) throw new Refused(`${name} has over ${MAX_WAVES} harmonics`);
     const mean = number(data.mean, `${name}.mean`);
     return given === "omega" ? new Fourier(mean, size, c, d) : new Fourier(mean, (2 * Math.PI) / size, c, d, size);
   }
@@ -36,6 +46,8 @@ function readLaw(data, name) {
   checkFields(data, ["kind", "knots"], [], name);
   const knots = data.knots.map(([t, v]) => [number(t, `${name}.knots`), number(v, `${name}.knots`)]);
   if (knots.length < 2 || knots[0][1] !== knots.at(-1)[1]) throw new Refused(`${name}.knots must close: no jumps`);
+  if (knots.length > MAX_KNOTS) throw new Refused(`${name} has over ${MAX_KNOTS} knots`);
+  if (!isExact(knots.at(-1)[0], knots[0][0])) throw new Refused(`${name}.knots: the period must be a binary64 number`);
   if (knots.some(([t], i) => i && t <= knots[i - 1][0])) throw new Refused(`${name}.knots: times must increase`);
   return knots.some(([, v]) => v !== knots[0][1]) ? new BangBang(knots) : new Fourier(knots[0][1]);
 }

@@ -85,10 +85,12 @@ def end_as_due(
     side: Implementation, scene: Scene, state: State, n: int, t_end: float, due: Sequence[str]
 ) -> bool:
     """Hold the outcomes, or the reasons of those that are undefined, to those that are due."""
-    parts = side.parts(question(side.profile, scene, state, t_end, n))
+    request = question(side.profile, scene, state, t_end, n)
+    parts = side.parts(request)
     found = [part["reason"] if part["outcome"] == "undefined" else part["outcome"] for part in parts]
     if found[-1:] == ["undecided"] and len(found) <= len(due):
-        side.n_undecided -= due[-1] not in ("collision", "horizon")  # it may be where no answer exists
+        if due[-1] not in ("collision", "horizon"):
+            side.answers.excuse(request)
         return False
     where = f"{n} hits from {state} to {t_end} in {scene}"
     assert found == list(due), f"{where} are answered {found}, must be {list(due)}"

@@ -5,9 +5,11 @@ implementation offers. The implementation may be a process or Python functions: 
 1 through `conformance.suite.session.Session`.
 """
 
+import hashlib
 import math
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -15,7 +17,7 @@ import msgspec
 
 from conformance.cases.draw import Draw
 from conformance.suite.process import NOT_NUMBERS, CheckFailure
-from conformance.suite.result import Result
+from conformance.suite.result import MAX_DECLINED_OF_PART, Result, declines_too_much
 from conformance.suite.session import MAX_SEQ, Session, missing, outcomes_of, read_outcome
 from conformance.vectors import question, wire_data
 from scene import Collision, Outcome, Scene, State, to_data
@@ -25,7 +27,6 @@ QUESTIONS = ("step", "trajectory", "flow")  # the profiles that answer by outcom
 FOREVER = sys.float_info.max  # t_end of a question that only collisions end
 MAX_DRAWN = 6  # times that questions are drawn for an implementation of a part of the tables or laws
 SEQ = MAX_SEQ // 2  # of a line that is written by hand
-MAX_UNDECIDED = 0.1  # of a check's questions: more, and it is declined
 Question = tuple[Any, ...]  # a scene that is asked about, or its data, and what else `judges` takes
 
 
@@ -46,20 +47,75 @@ class SuiteCheck(NamedTuple):
     profiles: tuple[str, ...] = QUESTIONS
 
 
+class AnswerTally:
+    """The different answers that a check asked for, and those left undecided where `undecided` does not pass.
+
+    Equal questions count once, so that a run counts what a file of questions counts. A path has an answer for
+    each of its steps, a flow one for each different state. Each command is counted for itself: what is asked
+    as steps does not speak for paths.
+    """
+
+    def __init__(self) -> None:
+        self._counted = defaultdict[str, dict[bytes, tuple[int, int]]](dict)
+
+    def counts(self) -> tuple[int, int]:
+        """Return how many answers are undecided, and how many there are.
+
+        They are those of the first command of which too many are undecided, or else those of all commands.
+        """
+        found = [
+            (sum(n_undecided for n_undecided, _ in counted.values()), sum(n for _, n in counted.values()))
+            for counted in self._counted.values()
+        ]
+        for n_undecided, n in found:
+            if declines_too_much(n_undecided, n, MAX_DECLINED_OF_PART):
+                return n_undecided, n
+        return sum(n_undecided for n_undecided, _ in found), sum(n for _, n in found)
+
+    def add(self, request: Mapping[str, Any], outcomes: Sequence[str]) -> None:
+        """Count what answers a request: its outcomes, in order."""
+        keys, counted = _keys_of(request), self._counted[str(request.get("cmd"))]
+        if len(keys) == len(outcomes):
+            for key, outcome in zip(keys, outcomes, strict=True):
+                counted[key] = (int(outcome == "undecided"), 1)
+        else:
+            n_undecided = sum(outcome == "undecided" for outcome in outcomes)
+            counted[b"".join(keys)] = (n_undecided, len(outcomes))
+
+    def excuse(self, request: Mapping[str, Any]) -> None:
+        """Take back what was counted of a request: `undecided` passes there, as nothing else is right."""
+        for key in _keys_of(request):
+            self._counted[str(request.get("cmd"))].pop(key, None)
+
+
+def _keys_of(request: Mapping[str, Any]) -> list[bytes]:
+    """Return a key for each state of a flow, one for any other request; equal for equal questions."""
+    states = request.get("states")
+    whole = digest_of({name: part for name, part in request.items() if name not in ("seq", "states")})
+    if not isinstance(states, list | tuple):
+        return [whole + digest_of(states)]
+    return [whole + digest_of(state) for state in states]
+
+
+def digest_of(question: object) -> bytes:
+    """Return a short name of what is asked, equal for equal questions."""
+    return hashlib.blake2b(msgspec.json.encode(question, order="sorted"), digest_size=16).digest()
+
+
 class Implementation:
     """An open session, asked by one profile; called as a stepper, it answers by the first outcome.
 
     Attributes:
         session: with the implementation.
         profile: step, trajectory or flow (or time).
-        n_asked, n_undecided: outcomes counted so far.
+        answers: what it answered so far.
         errors: of its numbers so far, by what they are of (`checks.paths`).
     """
 
-    def __init__(self, session: Session, profile: str) -> None:
+    def __init__(self, session: Session, profile: str, answers: AnswerTally | None = None) -> None:
         self.session, self.profile = session, profile
         self.errors: dict[str, list[float]] = {}
-        self.n_asked = self.n_undecided = 0
+        self.answers = AnswerTally() if answers is None else answers
 
     def __call__(self, scene: Scene, state: State, t_end: float) -> Outcome:
         """Return one outcome: of a step, of a trajectory of one collision, or of a flow of one state."""
@@ -76,7 +132,7 @@ class Implementation:
         """
         for profile in profiles:
             if not missing(self.session.introduction, profile, to_data(scene)):
-                return Implementation(self.session, profile)
+                return Implementation(self.session, profile, self.answers)
         raise CheckFailure("unsupported", f"profile {' or '.join(profiles)}")
 
     def parts(self, request: Mapping[str, Any], n_due: int | None = None) -> list[dict[str, Any]]:
@@ -89,12 +145,16 @@ class Implementation:
         Raises:
             CheckFailure: also error, and wrong-format for another number of outcomes.
         """
-        answer = self.session.ask(request)
+        try:
+            answer = self.session.ask(request)
+        except CheckFailure as failure:
+            if failure.verdict == "declined":  # behind a file of answers: this one is missing
+                self.answers.add(request, ["undecided"] * len(_keys_of(request)))
+            raise
         if "error" in answer:
             raise CheckFailure("error", answer["error"])
         found = outcomes_of(answer)
-        self.n_asked += len(found)
-        self.n_undecided += sum(part["outcome"] == "undecided" for part in found)
+        self.answers.add(request, [part["outcome"] for part in found])
         if n_due not in (None, len(found)):
             raise CheckFailure("wrong-format", f"{n_due} outcomes are due, answered are {found}"[:200])
         return found
@@ -141,15 +201,23 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
     """Ask all that a check draws from a seed, of every profile that is offered, up to the first fault."""
     begin, lacking = time.monotonic(), ""
     notes: list[str] = []
-    n = n_compared = n_declined = n_open = n_asked = 0
+    n = n_compared = n_declined = 0
+    answers = AnswerTally()
 
     def result(verdict: str, why: str, paste: str = "") -> Result:
         return Result(
-            check.name, check.name.partition("/")[0], verdict, why, time.monotonic() - begin, paste=paste
+            check.name,
+            check.name.partition("/")[0],
+            verdict,
+            why,
+            time.monotonic() - begin,
+            paste=paste,
+            n_answers=answers.counts()[1],
+            n_undecided=answers.counts()[0],
         )
 
     for profile in check.profiles:
-        side = Implementation(session, profile)
+        side = Implementation(session, profile, answers)
         fitting, lacking = _draw_asked(check, session.introduction, profile, seed)
         for asked in fitting:
             try:
@@ -169,13 +237,17 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
                 else:
                     why = f"{profile}: {failure.why}"
                     return result(failure.verdict, why, as_pytest(check, profile, asked))
-        n_open, n_asked = n_open + side.n_undecided, n_asked + side.n_asked
     why = "; ".join(notes[:4]) or f"{n_compared} of {n} compared"
-    if n_declined > MAX_UNDECIDED * n:
+    n_undecided, n_answers = answers.counts()
+    if n_undecided:
+        why += f"; {n_undecided} of {n_answers} answers are undecided"
+    if declines_too_much(n_undecided, n_answers, MAX_DECLINED_OF_PART):
         return result("declined", why)
-    if n_open > MAX_UNDECIDED * n_asked:
-        return result("declined", f"{why}; {n_open} of {n_asked} answers are undecided")
-    return result("pass", why) if n_compared else result("unsupported", lacking or "nothing to compare")
+    if n_compared:
+        return result("pass", why)
+    if n_declined or n_undecided:
+        return result("declined", why)
+    return result("unsupported", lacking or "nothing to compare")
 
 
 def _draw_asked(

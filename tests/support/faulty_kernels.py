@@ -60,7 +60,7 @@ def faulty_lanes(*changes: str) -> ModuleType:
     module = ModuleType("faulty_lanes")
     for name, source in sources.items():  # the last one's functions replace those that the first imports
         exec(compile(source, name, "exec"), module.__dict__)
-    for name, found in vars(records).items():
+    for name, found in (vars(records) | vars(rows)).items():
         vars(module).setdefault(name, found)
     names = [each.__name__ for each in (module, lane_laws, records, rows)]
     for name, found in list(vars(module).items()):

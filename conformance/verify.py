@@ -17,40 +17,58 @@ computes with integers and imports Python's standard library only. docs/proof.md
  6. `start`: which wall a state leaves, or why it is refused or has no answer.
  7. `read_scene`: the scene is valid at all times, or is proved to be invalid.
  8. `check_line`: what a line claims, compared with what is proved.
- 9. `backward_error`: for --answers only, an estimate and not a proof.
 
-"Proved": the true numbers lie between the decimals, which may be far apart. "False": what is proved
-contradicts the claim. "Not proved": it is open at each precision up to 4,096 bits, or a search took
-too long. Walls that are met together at an irrational time stay open, and so do exact zeros of
-Fourier laws at another phase than 0.
+The proof ends there. Section 9 reads files and prints verdicts. Section 10 is for --answers only:
+it estimates errors and proves nothing.
 
-Not judged are the fields `allowance`, `condition` and `level`, the texts that describe a line, and
-the reason of a rejection. A scene counts as refused where `scene.from_data` refuses it, but where
-laws of both kinds meet in one condition: that one refuses what touches, or nearly.
+There are three verdicts:
+
+- "proved": the claim is true. The true numbers lie between the decimals, which may be far apart;
+  `--digits` bounds how far.
+- "false": something that is proved contradicts the claim.
+- "not proved": the claim is open at each precision up to 4,096 bits, or a search took too long.
+
+Two kinds of claims stay open: two walls met together at an irrational time, and exact zeros of a
+Fourier law at a phase that is not a whole number of quarter turns.
+
+The verifier does not judge the fields `allowance`, `condition` and `level`, the texts that describe
+a line, and the reason of a rejection. It refuses the scenes that `scene.from_data` refuses, with one
+exception: if laws of both kinds meet in one condition, `scene.from_data` also refuses scenes that
+touch or nearly touch the bound.
 """
 
-from __future__ import annotations
-
+import argparse
+import csv
+import io
 import itertools
 import json
+import os
 import re
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache, partial, reduce
 from math import floor, inf
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
+
+if sys.version_info < (3, 10):  # noqa: UP036 - people run this file alone
+    sys.stderr.write("verify.py needs Python 3.10 or later\n")
+    sys.exit(2)
 
 PRECISIONS = (128, 256, 512, 1024, 2048, 4096)  # bits, tried in turn
-WORK = 200_000  # units of work for a line, of some 60 microseconds each: about 12 seconds in all
+WORK = 480_000  # units of work for a line, of some 25 microseconds each: about 12 seconds in all
 SHARE = Fraction(61, 128)  # where a stretch is cut: not in the middle, where a root may well lie
 NEAR = Fraction(1, 2**20)  # how far from its wall a state may lie, as a share of the wall's size
 LATE, LARGE = 2**30, Fraction(10**100)  # |t| in periods, or a number, from which one may refuse
 MOST_WAVES, MOST_KNOTS = 16, 256  # of a law
 UNIT = Fraction(1, 2**53)  # unit roundoff of binary64: half a unit in the last place, relative
 BEYOND = Fraction(3, 2**12)  # how far past its end a search goes, as a share of its length
-WRONG = Fraction(1, 10**9)  # --answers: relative backward error beyond which a step is false
+WITHIN = 1e-9 * 2.0**53  # --answers: backward error, in ulps, beyond which a step is false
+TICKS = 2  # --answers: last places by which the time of an answer may be off, however short dt is
+FAR = 1e300  # --answers: the horizon of a path that has none
+PULSE = 5  # --answers: seconds between two lines of progress
+LARGEST = sys.float_info.max
 SIDES = ("left", "right", "floor")
 WALLS = {"cap": ("arc", "base"), "stem": ("base", *SIDES), "mushroom": ("arc", "base", *SIDES)}
 FIELDS = ("t", "x", "y", "vx", "vy")  # of a state, and of an answer in floating point
@@ -65,7 +83,7 @@ HIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uff
 
 
 class Unproved(Exception):  # noqa: N818
-    """This precision leaves something open; the next one may not."""
+    """Something is open at this precision. The next precision may decide it."""
 
 
 class Refused(Exception):  # noqa: N818
@@ -106,30 +124,38 @@ class Interval:
         """Keep the ends as they are."""
         self.lo, self.hi, self.exp, self.bits = lo, hi, exp, bits
 
-    def __add__(self, other: Interval) -> Interval:
+    def __add__(self, other: "Interval") -> "Interval":
         """Return all sums."""
+        if other.lo == other.hi == 0:
+            return self
+        if self.lo == self.hi == 0:
+            return rounded(other.lo, other.hi, other.exp, self.bits)
         exp = min(self.exp, other.exp)
         up, other_up = self.exp - exp, other.exp - exp
         lo, hi = (self.lo << up) + (other.lo << other_up), (self.hi << up) + (other.hi << other_up)
         return rounded(lo, hi, exp, self.bits)
 
-    def __neg__(self) -> Interval:
+    def __neg__(self) -> "Interval":
         """Return all numbers with the other sign."""
         return Interval(-self.hi, -self.lo, self.exp, self.bits)
 
-    def __sub__(self, other: Interval) -> Interval:
+    def __sub__(self, other: "Interval") -> "Interval":
         """Return all differences."""
         return self + -other
 
-    def __mul__(self, other: Interval | int) -> Interval:
+    def __mul__(self, other: "Interval | int") -> "Interval":
         """Return all products."""
         if isinstance(other, int):
             other = Interval(other, other, 0, self.bits)
+        if self.lo == self.hi == 0 or other.lo == other.hi == 0:
+            return Interval(0, 0, 0, self.bits)
         a, b, c, d = self.lo, self.hi, other.lo, other.hi
+        if a >= 0 and c >= 0:
+            return rounded(a * c, b * d, self.exp + other.exp, self.bits)
         products = (a * c, a * d, b * c, b * d)
         return rounded(min(products), max(products), self.exp + other.exp, self.bits)
 
-    def __truediv__(self, other: Interval) -> Interval:
+    def __truediv__(self, other: "Interval") -> "Interval":
         """Return all quotients.
 
         Raises:
@@ -141,7 +167,7 @@ class Interval:
         lo, hi = min(a // b for a, b in pairs), max(-(-a // b) for a, b in pairs)
         return rounded(lo, hi, self.exp - other.exp - up, self.bits)
 
-    def __pow__(self, power: int) -> Interval:
+    def __pow__(self, power: int) -> "Interval":
         """Return all squares. `power` is 2: where 0 is inside, the least square is 0."""
         ends = self.lo**power, self.hi**power
         return rounded(min(ends) if self.sign else 0, max(ends), power * self.exp, self.bits)
@@ -152,12 +178,12 @@ class Interval:
         return (self.lo > 0) - (self.hi < 0)
 
     @property
-    def low(self) -> Interval:
+    def low(self) -> "Interval":
         """Return the lower end, a point."""
         return Interval(self.lo, self.lo, self.exp, self.bits)
 
     @property
-    def high(self) -> Interval:
+    def high(self) -> "Interval":
         """Return the upper end, a point."""
         return Interval(self.hi, self.hi, self.exp, self.bits)
 
@@ -167,7 +193,7 @@ class Interval:
         up, down = 1 << max(self.exp, 0), 1 << max(-self.exp, 0)
         return Fraction(self.lo * up, down), Fraction(self.hi * up, down)
 
-    def cut(self) -> Interval:
+    def cut(self) -> "Interval":
         """Return a point inside, near the middle: not the middle, where a root may well lie.
 
         An interval too narrow to cut gives its lower end.
@@ -175,7 +201,7 @@ class Interval:
         point = (self.low + (self.high - self.low) * number(SHARE, self.bits)).low
         return point if is_below(self.low, point) else self.low
 
-    def simplest(self) -> Interval:
+    def simplest(self) -> "Interval":
         """Return a point inside that has few digits: a root that has few is then found exactly.
 
         It is the first multiple of 2^up above lo, and 2^up <= hi - lo.
@@ -186,7 +212,13 @@ class Interval:
 
 
 def rounded(lo: int, hi: int, exp: int, bits: int) -> Interval:
-    """Return an interval rounded outward to so many digits."""
+    """Return an interval rounded outward to so many digits.
+
+    The number 0 gets the exponent 0. Exponents of products add up, and no digit of 0 would ever be
+    rounded away: over a long path its exponent would fall without end.
+    """
+    if lo == hi == 0:
+        return Interval(0, 0, 0, bits)
     extra = max(0, max(lo.bit_length(), hi.bit_length()) - bits)
     return Interval(lo >> extra, -(-hi >> extra), exp + extra, bits)
 
@@ -213,11 +245,9 @@ def join(*parts: Interval) -> Interval:
 
 
 def is_below(one: Interval, other: Interval) -> bool:
-    """Tell whether every number of one interval is less than every number of another.
-
-    Rounding outward never changes the sign of a difference of two points.
-    """
-    return (other.low - one.high).sign > 0
+    """Tell whether every number of one interval is less than every number of another."""
+    exp = min(one.exp, other.exp)
+    return one.hi << (one.exp - exp) < other.lo << (other.exp - exp)
 
 
 @lru_cache(maxsize=64)
@@ -272,12 +302,25 @@ class Jet(NamedTuple):
     d1: Any
     d2: Any
 
+    def __add__(self, other: Any) -> "Jet":
+        """Return the sum."""
+        return Jet(self.f + other.f, self.d1 + other.d1, self.d2 + other.d2)
 
-def times(p: Jet, q: Jet) -> Jet:
-    """Return the product, by Leibniz' rule. A square (p is q) is enclosed more tightly, as one."""
-    if p is q:
-        return Jet(p.f**2, p.f * p.d1 * 2, (p.d1**2 + p.f * p.d2) * 2)
-    return Jet(p.f * q.f, p.d1 * q.f + p.f * q.d1, p.d2 * q.f + p.d1 * q.d1 * 2 + p.f * q.d2)
+    def __neg__(self) -> "Jet":
+        """Return the function with the other sign."""
+        return Jet(-self.f, -self.d1, -self.d2)
+
+    def __sub__(self, other: "Jet") -> "Jet":
+        """Return the difference."""
+        return self + -other
+
+    def __mul__(self, other: Any) -> "Jet":
+        """Return the product, by Leibniz' rule. A square is enclosed more tightly, as one."""
+        p, q = self, other
+        if p is q:
+            return Jet(p.f**2, p.f * p.d1 * 2, (p.d1**2 + p.f * p.d2) * 2)
+        d2 = p.d2 * q.f + p.d1 * q.d1 * 2 + p.f * q.d2
+        return Jet(p.f * q.f, p.d1 * q.f + p.f * q.d1, d2)
 
 
 class Leg(NamedTuple):
@@ -410,7 +453,7 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
     """
     exact = partial(number, bits=clock.bits)
     # With more digits only cosines cost much more.
-    clock.spend(len(law.waves) * (1 + clock.bits**2 // 2**18) + len(law.legs) // 16)
+    clock.spend(2 * len(law.waves) * (1 + clock.bits**2 // 2**18) + len(law.legs) // 8)
     if not law.legs:
         return wave_jet(law, clock.waves(s, len(law.waves)), clock.omega, exact)
     (low, high), first, jets = s.ends, law.legs[0].begin, []
@@ -430,11 +473,12 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
 def exact_jet(scene: Scene, time: Fraction, rate: int, name: str) -> Jet:
     """Return a law and its derivatives just after a time, as rationals.
 
-    Waves are taken at phase 0 only, where cosine is 1 and sine is 0: at time 0, and after whole
-    multiples of a rational period. There omega is irrational, and `rate` stands for it.
+    A wave is taken at whole quarters of its turn only. There cosine and sine are 0, 1 or -1. The
+    phase of wave k is 0 at time 0. Where the scene has a period, it is k time / period turns. There
+    omega is irrational, and `rate` stands for it.
 
     Raises:
-        Unproved: the law is not known to be rational.
+        Unproved: a wave is not at a whole quarter of its turn.
     """
     law = scene.laws[name]
     if law.legs:
@@ -443,40 +487,61 @@ def exact_jet(scene: Scene, time: Fraction, rate: int, name: str) -> Jet:
         leg = next(leg for leg in law.legs if at < leg.end)
         slope = leg.bend * (at - leg.origin)
         return Jet(leg.c + slope * (at - leg.origin) / 2, slope, leg.bend)
-    is_whole = scene.period is not None and (time / scene.period).denominator == 1
+    waves = [
+        quarter(scene, k * time) if any(factors) else QUARTERS[0]
+        for k, factors in enumerate(law.waves, 1)
+    ]
+    return wave_jet(law, waves, scene.omega or Fraction(rate), Fraction)
+
+
+# Cosine and sine after 0, 1, 2 and 3 quarters of a turn.
+QUARTERS = ((1, 0), (0, 1), (-1, 0), (0, -1))
+
+
+def quarter(scene: Scene, time: Fraction) -> tuple[int, int]:
+    """Return cosine and sine of the phase at a time, where it is a whole number of quarter turns.
+
+    Raises:
+        Unproved: the phase is not a whole number of quarter turns.
+    """
+    quarters = 4 * time / scene.period if scene.period else Fraction(0)
     require(
-        not law.waves or time == 0 or is_whole,
+        quarters.denominator == 1 and (scene.period or time == 0),
         Unproved("a law is not known to be rational at this time"),
     )
-    return wave_jet(law, [(1, 0)] * len(law.waves), scene.omega or Fraction(rate), Fraction)
+    return QUARTERS[quarters.numerator % 4]
 
 
 # 3. Walls
 
-# f is a sum of products of laws and coordinates, each with its sign; f > 0 inside the table. The
-# base of a stem lies above the particle: "top". The last two are conditions, not walls: a scene is
-# valid while r - w >= 0, w - h slope > 0, and every law but the slope is > 0.
-TERMS: dict[str, tuple[tuple[Any, ...], ...]] = {
-    "arc": ((1, "r", "r"), (-1, "x", "x"), (-1, "y", "y")),
-    "base": ((1, "y"),),
-    "top": ((-1, "y"),),
-    "floor": ((1, "y"), (1, "h")),
-    "left": ((1, "w"), (1, "slope", "y"), (1, "x")),
-    "right": ((1, "w"), (1, "slope", "y"), (-1, "x")),
-    "r - w": ((1, "r"), (-1, "w")),
-    "w - h slope": ((1, "w"), (-1, "h", "slope")),
-}
-
 
 def wall_jet(scene: Scene, wall: str, law: Callable[[str], Jet], x: Jet, y: Jet) -> Jet:
-    """Return f of a wall along a flight, or a law; w = nu r where nu is given."""
-    name = "top" if (wall, scene.table) == ("base", "stem") else wall
-    place, products = {"x": x, "y": y}, []
-    for sign, *names in TERMS.get(name, ((1, name),)):
-        parts = ["nu", "r"] if names == ["w"] and "nu" in scene.laws else names
-        product = reduce(times, (place.get(part) or law(part) for part in parts))
-        products.append([part * sign for part in product])
-    return Jet(*(reduce(lambda p, q: p + q, parts) for parts in zip(*products, strict=True)))
+    """Return f of a wall along a flight; f > 0 inside the table.
+
+    The base of a stem lies above the particle. Other names are conditions, not walls: a scene is
+    valid while r - w >= 0, w - h slope > 0, and every law but the slope is > 0.
+    """
+    if wall == "arc":
+        r = law("r")
+        return r * r - x * x - y * y
+    if wall == "base":
+        return -y if scene.table == "stem" else y
+    if wall == "floor":
+        return y + law("h")
+    if wall == "left":
+        return width(scene, law) + law("slope") * y + x
+    if wall == "right":
+        return width(scene, law) + law("slope") * y - x
+    if wall == "r - w":
+        return law("r") - width(scene, law)
+    if wall == "w - h slope":
+        return width(scene, law) - law("h") * law("slope")
+    return width(scene, law) if wall == "w" else law(wall)
+
+
+def width(scene: Scene, law: Callable[[str], Jet]) -> Jet:
+    """Return w, half the width of the mouth: w = nu r where nu is given."""
+    return law("nu") * law("r") if "nu" in scene.laws else law("w")
 
 
 # 4. Where f > 0, and where it vanishes first
@@ -499,9 +564,12 @@ class Flight:
     """A particle in flight: where walls are on its way, and what it meets first.
 
     Times count from the clock's instant. The line at time 0 is enclosed by a box. The flight begins
-    at some time in `begin`, which is exactly 0 for a state that is given. What is proved holds for
-    each state in the box. On the wall that it leaves f is not 0 at the begin but c, the residual,
-    because the state is rounded. There f - c stands for f.
+    at some time in `begin`, which is exactly 0 for a state that is given. The true state is one of
+    those in the box, and what is proved about walls that are met holds for every state in the box.
+
+    The wall being left is an exception. There f is not 0 at the begin but c, the residual, because
+    the state is rounded. f - c stands for f, and f - c = 0 at the begin holds for the true state
+    only. What is proved about this wall holds for the true state.
     """
 
     def __init__(
@@ -533,9 +601,11 @@ class Flight:
 
     def law(self, name: str, s: Interval) -> Jet:
         """Enclose a law over a stretch."""
-        key = name, s.lo, s.hi, s.exp
+        law = self.scene.laws[name]
+        # A law that never moves is the same over every stretch.
+        key = (name, s.lo, s.hi, s.exp) if law.waves or law.legs else (name, 0, 0, 0)
         if key not in self._laws:
-            self._laws[key] = law_jet(self.scene.laws[name], self.clock, s)
+            self._laws[key] = law_jet(law, self.clock, s)
         return self._laws[key]
 
     def f(self, wall: str, s: Interval) -> Jet:
@@ -551,7 +621,7 @@ class Flight:
         Derivatives of laws with a period are those for 2 pi / period = `rate`.
 
         Raises:
-            Unproved: it is not known to be rational.
+            Unproved: f is not known to be rational at this time.
         """
         if self.state is None:
             raise Unproved("the state is not known exactly")
@@ -567,7 +637,7 @@ class Flight:
         except Unproved:
             return False
 
-    def is_clear(self, wall: str, s: Interval) -> bool:
+    def is_clear(self, wall: str, s: Interval, jet: Jet, last: Interval) -> bool:
         """Tell whether f > 0 is proved on a stretch but at its left end, where f >= 0 is known.
 
         Then f > 0 at its right end, where the next stretch starts. f and f' are continuous, for
@@ -583,20 +653,28 @@ class Flight:
         - never reached: the wall never comes to where the particle is at either end
           (`is_never_met`).
 
-        The wall being left has f = 0 where the flight begins, somewhere in `begin`. A stretch that
-        holds `begin` holds all of it, and f > 0 is proved after the begin only. Rising and concave
-        prove this: the chord starts at 0, wherever the begin is. So does f'' > 0 if f' = 0 at the
-        begin exactly (lifting, `is_flat`).
+        The wall being left has f = 0 where the flight begins, somewhere in `begin`. On a stretch
+        that `begin` overlaps, f > 0 is proved after the begin only. There are three cases. If the
+        flight begins within the stretch, f rises from 0, or its chord starts at 0. If it begins
+        before the stretch, f > 0 is known at the left end. If it begins after the stretch, there is
+        nothing to prove. So "rising" and "concave" suffice there. f'' > 0 suffices, too, if f' = 0
+        at the begin exactly (lifting, `is_flat`).
+
+        Args:
+            wall: the wall.
+            s: the stretch.
+            jet: f and its derivatives over the stretch.
+            last: f at the right end.
         """
-        jet, p = self.f(wall, s), s.simplest()
-        is_positive_at_end = self.f(wall, s.high).f.sign > 0
+        is_positive_at_end = last.sign > 0
         if jet.d1.sign > 0 or (jet.d2.hi <= 0 and is_positive_at_end):
             return True
         if self.holds_begin(wall, s):
             return bool(self.is_flat and jet.d2.sign > 0)
         if jet.f.sign > 0 or (jet.d1.sign < 0 and is_positive_at_end):
             return True
-        at, u, half = self.f(wall, p), s - p, number(Fraction(1, 2), self.bits)
+        p, half = s.simplest(), number(Fraction(1, 2), self.bits)
+        at, u = self.f(wall, p), s - p
         is_positive = (at.f + at.d1 * u + jet.d2 * u**2 * half).sign > 0
         return is_positive or all(self.is_never_met(wall, end, s) for end in (s.high, s.low))
 
@@ -646,12 +724,13 @@ class Flight:
         )
         parts = [join(start, stop)]
         while parts:
-            self.clock.spend(6)
+            self.clock.spend(6 + 12 * self.bits**2 // 2**20)
             part = parts.pop()
-            if self.is_clear(wall, part):
+            jet, last = self.f(wall, part), self.f(wall, part.high).f
+            if self.is_clear(wall, part, jet, last):
                 continue
             at_begin, cut = self.holds_begin(wall, part), part.cut()
-            falls = self.f(wall, part).d1.sign < 0 and self.f(wall, part.high).f.sign < 0
+            falls = jet.d1.sign < 0 and last.sign < 0
             if falls and not at_begin:
                 return self.closest(wall, part)
             require(
@@ -695,8 +774,8 @@ class Flight:
             in_cap: the flight begins above y = 0, or on it and moves up.
 
         Raises:
-            Undefined: two walls are met together, or the mouth's edge, exactly.
-            Unproved: this precision cannot tell.
+            Undefined: two walls are met together exactly, or the mouth's edge is met.
+            Unproved: this precision cannot tell what is met.
         """
         table, end, state = self.scene.table, number(self.end, self.bits), self.state
         if state and state.y == state.vy == 0 and table == "mushroom" and self.wall is None:
@@ -745,15 +824,22 @@ class Flight:
     ) -> tuple[str, Interval] | None:
         """Find which of some walls is met first, before y = 0 is crossed or the horizon comes.
 
-        Each search covers one stretch, for all walls. A wall without a root is clear at least to
-        the upper end of the earliest root: until a root is found walls are clear to the end of the
-        stretch, and the first root lies in it; then they are searched to just past the root found
-        last. So `earliest` needs to compare the roots only. A wall of which something is open is
-        asked again after the others: it may be open after their hit only.
+        Each search covers one stretch. All walls are searched in it, one after the other.
 
-        The last search goes a little past the limit, so that a root there lies inside. The limit is
-        the horizon if it ends at self.end; a crossing lies before that. What is met at the horizon
-        exactly is not met before it: its enclosure overlaps the horizon and holds one root only.
+        `stop` is where the search for the next wall ends. At first it is the end of the stretch.
+        Once a root is found it is just past that root. A later root may lie a little beyond the one
+        before, so `stop` may also grow. It never falls below the upper end of the earliest root.
+        Therefore a wall without a root is clear up to that upper end, and `earliest` needs to
+        compare the roots only.
+
+        A wall of which something is open is asked again after the others. Perhaps it is open after
+        their hit only, and then the search ends before that.
+
+        The last search goes a little past the limit, so that a root at the limit lies inside the
+        stretch. There are two kinds of limit. The horizon is enclosed by self.end exactly. A
+        crossing of y = 0 lies before that, so its upper end differs from self.end; a wall that is
+        met there counts as a hit, and `earliest` decides. A wall that is met at the horizon exactly
+        is not met before it: its enclosure overlaps the horizon and holds one root only.
         """
         for since, stop in self.stretches(start, limit.high):
             hits, queue = [], list(walls)
@@ -783,6 +869,9 @@ class Flight:
         The first is about as long as a crossing of the table or a period, whichever is less. Each
         next one is four times as long. The lengths affect the cost only, not what is proved. They
         are others at each precision: where a wall is met at the end of a stretch, it is open.
+
+        A particle at rest gives no length, nor does a table at rest. If both rest, one stretch
+        reaches `last`, and f is constant on it.
         """
         sizes = [law.ends[1] for name, law in self.scene.laws.items() if name in ("r", "w", "h")]
         speed = max(abs(end) for v in self.line[2:] for end in v.ends)
@@ -791,9 +880,11 @@ class Flight:
         length = number(min(lengths, default=Fraction(1)) * (1 - Fraction(8, self.bits)), 32).high
         if self.clock.turn and not speed:
             last = min(last, (self.begin + self.clock.turn).high, key=lambda point: point.ends)
-        while lengths and is_below(stop := (start + length).high, last):
+        stop = (start + length).high
+        while lengths and is_below(stop, last):
             yield start, stop
             start, length = stop, length * 4
+            stop = (start + length).high
         yield start, self.beyond(start, last)
 
     def beyond(self, start: Interval, stop: Interval) -> Interval:
@@ -805,11 +896,13 @@ class Flight:
     ) -> tuple[str, Interval]:
         """Return the earliest of some hits, each the first of its wall.
 
-        `first_hit` has shown that walls without a hit come later.
+        `first_hit` has shown that walls without a hit are clear up to the upper end of the earliest
+        root. A moment that is guessed below lies within the enclosure of a root, and before all
+        roots that are not met at that moment. So walls without a hit are clear up to it, too.
 
         Raises:
             Undefined: walls are met together at a rational time, exactly, and all others later.
-            Unproved: which is first is open.
+            Unproved: it is open which wall is met first.
         """
         best = min(hits, key=lambda hit: hit[1].ends[1])
         if all(hit is best or is_below(best[1], hit[1]) for hit in hits) and is_below(
@@ -818,18 +911,20 @@ class Flight:
             return best
         # A guess: the fraction closest to a root, with a denominator of half as many digits. It
         # proves nothing. `is_zero` proves f = 0 there, and a root's enclosure holds one root only.
-        for time in (root.ends[0].limit_denominator(2 ** (self.bits // 2 - 8)) for _, root in hits):
+        for moment in (
+            root.ends[0].limit_denominator(2 ** (self.bits // 2 - 8)) for _, root in hits
+        ):
             met = {
                 w
                 for w, root in hits
-                if root.ends[0] <= time <= root.ends[1] and self.is_zero(w, time)
+                if root.ends[0] <= moment <= root.ends[1] and self.is_zero(w, moment)
             }
             is_first = (
-                all(wall in met or time < root.ends[0] for wall, root in hits)
-                and 0 < time < self.end
-                and (exact is None or time <= exact)
+                all(wall in met or moment < root.ends[0] for wall, root in hits)
+                and 0 < moment < self.end
+                and (exact is None or moment <= exact)
             )
-            met |= {"base"} if time == exact else set()
+            met |= {"base"} if moment == exact else set()
             is_edge = self.scene.table == "mushroom" and "base" in met and "arc" not in met
             require(
                 not (is_first and len(met) > 1),
@@ -882,13 +977,17 @@ def start(scene: Scene, state: State, t_end: Fraction, bits: int) -> tuple[Fligh
     mouth it is on the base, so the arc is asked. Inside the mouth |x| < w <= r, so the arc is not
     asked. On the arc at y = 0 it is at a corner, so the base is asked, too.
 
+    Where w = r, a state at y = 0 and |x| = w is on a side, on the base and on the arc. If it names
+    the arc or the base, both of these are asked, and it is at a corner. If it names a side or no
+    wall, the sides are asked, and it is at the mouth's edge.
+
     Returns:
         The flight, and whether it begins in the cap.
 
     Raises:
-        Refused: the state is not in the table, or off its wall, or moves into it.
-        Undefined: it is on two walls, or slides along one.
-        Unproved: this precision cannot tell.
+        Refused: the state is outside the table, is off its wall, or moves into its wall.
+        Undefined: the state is on two walls, or slides along a wall.
+        Unproved: this precision cannot tell where the state is.
     """
     table, wall, level = scene.table, state.wall, state.y == 0
     require(state.t <= t_end, Refused("t_end is before state.t"))
@@ -935,9 +1034,9 @@ def is_flat(flight: Flight, wall: str) -> bool:
     coefficients do, and then at three rates.
 
     Raises:
-        Refused: f' < 0.
-        Undefined: f' = 0 and f'' <= 0.
-        Unproved: this precision cannot tell.
+        Refused: f' < 0, so the particle moves into the wall.
+        Undefined: f' = 0 and f'' <= 0, so the particle does not leave the wall.
+        Unproved: this precision cannot tell the sign of f' or f''.
     """
     slope, scene = flight.f(wall, flight.clock.zero).d1.sign, flight.scene
     require(slope >= 0, Refused(f"the particle starts on wall {wall} and moves into it"))
@@ -959,8 +1058,8 @@ def require_near(flight: Flight, wall: str, gap: Interval) -> None:
     w, or |x| if greater. The arc's f is about 2 r times the distance, so it is divided by 2 r.
 
     Raises:
-        Refused: it is.
-        Unproved: this precision cannot tell.
+        Refused: the state is too far from its wall.
+        Unproved: this precision cannot tell how far the state is.
     """
     is_width = wall in ("left", "right") or (wall == "base" and flight.scene.table == "stem")
     size = flight.f("w" if is_width else "h" if wall == "floor" else "r", flight.clock.zero).f
@@ -985,8 +1084,8 @@ def read_scene(data: Any, work: list[int]) -> Scene:
         work: one number: the units of work that are left.
 
     Raises:
-        Refused: it is not, with the condition that is broken.
-        Unproved: a condition is open.
+        Refused: the scene is invalid; the message names the broken condition.
+        Unproved: it is open whether a condition holds.
     """
     wanted = {
         "cap": [{"r"}],
@@ -1033,7 +1132,7 @@ def read_law(data: Any) -> tuple[Law, tuple[Fraction | None, Fraction | None]]:
     """Read a law, and its omega or its period.
 
     Raises:
-        Refused: it is none.
+        Refused: the JSON is not a law.
     """
     if not isinstance(data, dict):
         data = {"kind": "fourier", "mean": data, "omega": 1}
@@ -1065,7 +1164,7 @@ def read_legs(knots: Any) -> tuple[Law, tuple[None, Fraction]]:
     The law is at rest at the knots. Both legs have the same value and slope where they meet.
 
     Raises:
-        Refused: times do not rise, the law does not close, or its period is no binary64 number.
+        Refused: the times do not rise, the law does not close, or no binary64 number is the period.
     """
     require(
         isinstance(knots, list)
@@ -1090,7 +1189,7 @@ def read_number(name: str, value: Any) -> Fraction:
     """Return the binary64 number nearest to a number, as a fraction.
 
     Raises:
-        Refused: it is no finite number.
+        Refused: the value is not a finite number.
     """
     try:
         return Fraction(float(value if type(value) in (int, float, Fraction) else inf))
@@ -1104,11 +1203,14 @@ def require_valid(scene: Scene) -> None:
     A bound of a law shows it, or a search of section 4 over one period for a root of f. A root
     proves the condition broken: `first_root` accepts one only where f < 0 follows. So does a law
     that attains a bound <= 0 (`is_tight`). As r > 0, w = nu r <= r means nu <= 1. A condition that
-    touches 0 may stay open. The search has 256 bits at every precision.
+    touches 0 may stay open.
+
+    The search has 256 bits at every precision. More bits would seldom decide more, because the
+    numbers of a scene have 53. What is proved does not depend on that, only what stays open.
 
     Raises:
         Refused: a condition is broken.
-        Unproved: it is open.
+        Unproved: it is open whether a condition holds.
     """
     laws, clock = scene.laws, Clock(scene, Fraction(0), 256)
     zero, bounds = clock.zero, {name: law.ends[0] for name, law in laws.items() if name != "slope"}
@@ -1176,7 +1278,8 @@ def walk(scene: Scene, state: State, t_end: Fraction, bits: int) -> Iterator[Ste
         there = {name: number(value, bits) for name, value in zip(NUMBERS, state[:5], strict=True)}
         yield Step(None, there | {"dt": number(0, bits)})
         return
-    while hit := flight.event(in_cap=in_cap):
+    hit = flight.event(in_cap=in_cap)
+    while hit:
         numbers, later = bounce(flight, hit)
         (_, _, vx, vy), excess = flight.line, None
         if hit[0] == "arc" and scene.table == "mushroom":
@@ -1184,6 +1287,7 @@ def walk(scene: Scene, state: State, t_end: Fraction, bits: int) -> Iterator[Ste
             excess = (numbers["x"] * vy - numbers["y"] * vx) ** 2 - width**2 * (vx**2 + vy**2)
         yield Step(hit[0], numbers, excess)
         flight, in_cap = later, scene.table != "stem" and hit[0] in ("arc", "base")
+        hit = flight.event(in_cap=in_cap)
     end, (x, y, vx, vy) = number(flight.end, bits), flight.line
     numbers = {"dt": end - flight.begin, "x": x + vx * end, "y": y + vy * end, "vx": vx, "vy": vy}
     yield Step(None, numbers)
@@ -1220,7 +1324,7 @@ def take(data: Any, name: str, kind: type) -> Any:
     """Return a field of a JSON object.
 
     Raises:
-        Unreadable: it is missing, or of another type.
+        Unreadable: the field is missing, or has another type.
     """
     require(
         isinstance(data, dict) and isinstance(data.get(name), kind),
@@ -1233,9 +1337,9 @@ def require_inside(name: str, claim: Any, found: Interval) -> None:
     """Require that a claimed enclosure (low, high) holds the proved one (least, most).
 
     Raises:
-        Unreadable: the claim is no pair of decimals.
-        Contradicted: the number lies outside.
-        Unproved: it may.
+        Unreadable: the claim is not a pair of decimals.
+        Contradicted: the proved number lies outside the claimed enclosure.
+        Unproved: the proved number may lie outside.
     """
     ends, (least, most) = take(claim, name, list), found.ends
     require(
@@ -1249,6 +1353,76 @@ def require_inside(name: str, claim: Any, found: Interval) -> None:
     )
 
 
+# The fields of a line, of an answer in it and of a step, with the types that JSON has for them. A line
+# that has a field more, at any depth, is not read: somebody may take it for a part of what is proved.
+NUMBER, TEXT = (int, float), (str,)
+FORMS: dict[str, dict[str, tuple[type, ...]]] = {
+    "line": {
+        **dict.fromkeys(("id", "group", "level", "kind", "rule", "source"), TEXT),
+        **dict.fromkeys(("scene", "state"), (dict,)),
+        "t_end": (),  # of any type: a horizon that is no number is bad input
+        "expect": (list,),
+        "collisions": (int,),
+        "condition": NUMBER,
+    },
+    "answer": {"outcome": TEXT, "steps": (list,), "reason": TEXT, "stays": (list,)},
+    "step": {
+        **dict.fromkeys((*NUMBERS, "allowance"), (list,)),
+        "wall": (str, type(None)),
+    },
+}
+
+
+def require_form(what: str, data: Any) -> None:
+    """Require that an object of a line has known fields only, each of its type.
+
+    Raises:
+        Unreadable: a field is unknown or has another type; the message names it.
+    """
+    require(isinstance(data, dict), Unreadable(f"{what} must be an object"))
+    for name, value in data.items():
+        require(name in FORMS[what], Unreadable(f"{what} has an unknown field {name}"))
+        types = FORMS[what][name]
+        is_right = type(value) in types or not types
+        require(is_right, Unreadable(f"{what} has a field {name} of another type"))
+
+
+def require_known(record: Any) -> None:
+    """Require that a line has known fields only, at every depth.
+
+    The scene and the state are the question. An unknown field there is bad input, and the line may
+    say so.
+
+    Raises:
+        Unreadable: a field is unknown or has another type; the message names it.
+    """
+    require_form("line", record)
+    for answer in take(record, "expect", list):
+        require_form("answer", answer)
+        for step in answer.get("steps", []):
+            require_form("step", step)
+            allowance = step.get("allowance", [0] * 5)
+            require(
+                len(allowance) == 5 and all(type(number) in NUMBER for number in allowance),
+                Unreadable("allowance must be five numbers"),
+            )
+
+
+def require_narrow(record: Any, digits: int) -> None:
+    """Require that each enclosure of the first answer is at most 10^-digits of its larger end wide.
+
+    Raises:
+        Unproved: an enclosure is wider.
+    """
+    for place, step in enumerate(record["expect"][0].get("steps", []), 1):
+        for name in NUMBERS:
+            low, high = map(Fraction, step[name])
+            require(
+                (high - low) * 10**digits <= max(abs(low), abs(high)),
+                Unproved(f"step {place}: the enclosure of {name} is not narrow to {digits} digits"),
+            )
+
+
 def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
     """Hold a line to what is proved at one precision.
 
@@ -1258,9 +1432,9 @@ def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
         bits: the precision.
 
     Raises:
-        Unreadable: it is no line of a corpus.
-        Contradicted: its claim is false.
-        Unproved: its claim is open.
+        Unreadable: the line has not the form of a corpus line.
+        Contradicted: the claim is false.
+        Unproved: the claim is open.
     """
     first, others = claim_of(record)
     state, steps = take(record, "state", dict), take({"steps": [], **first}, "steps", list)
@@ -1354,7 +1528,7 @@ def read_state(scene: Scene, data: Mapping[str, Any]) -> State:
     """Read a state; fields that are unknown are ignored.
 
     Raises:
-        Refused: a field is missing, or no number, or the wall is none of the table.
+        Refused: a field is missing or not a number, or the table has no such wall.
     """
     wall = data.get("wall")
     is_wall = wall is None or wall in WALLS[scene.table]
@@ -1371,12 +1545,13 @@ def thin(path: Sequence[Step], claimed: Any) -> Iterator[Step]:
     dt counts from the step listed before.
 
     Raises:
-        Contradicted: the stays are others.
+        Contradicted: the path has other capture intervals.
     """
     stays = list(find_stays([mark(step) for step in path]))
     kept = sorted({place for stay in stays for place in stay} | {len(path) - 1})
+    listed = {place: at for at, place in enumerate(kept)}
     # Of 1.0 and true, which equal 1 and are no places, the text is another.
-    places = [[kept.index(place) for place in stay] for stay in stays]
+    places = [[listed[place] for place in stay] for stay in stays]
     require(
         claimed == places and str(claimed) == str(places),
         Contradicted("the particle is captured at other times"),
@@ -1386,148 +1561,675 @@ def thin(path: Sequence[Step], claimed: Any) -> Iterator[Step]:
         yield path[place]._replace(numbers={**path[place].numbers, "dt": dt})
 
 
-def verify_line(record: Any) -> Verdict:
+def verify_line(record: Any, digits: int | None = None) -> Verdict:
     """Prove a line of a corpus.
 
     Args:
         record: the line's JSON.
+        digits: if given, an enclosure wider than 10^-digits of its larger end is "not proved".
 
     Returns:
         The verdict: "proved", "false" or "not proved", and which step of the argument fails.
 
     Raises:
-        Unreadable: it is no line of a corpus.
+        Unreadable: the line has not the form of a corpus line.
     """
+    require_known(record)
     read = lru_cache(partial(read_scene, take(record, "scene", dict), [WORK]))
     verdict = Verdict("not proved")
     for bits in PRECISIONS:
         try:
             check_line(record, read, bits)
-            return Verdict("proved")
+            break
         except Contradicted as reason:
             # It is proved, whatever the precision.
             return Verdict("false", str(reason))
         except Unproved as reason:
             verdict = Verdict("not proved", str(reason))
-    return verdict
+    else:
+        return verdict
+    try:
+        if digits is not None:
+            require_narrow(record, digits)
+    except Unproved as reason:
+        return Verdict("not proved", str(reason))
+    return Verdict("proved")
 
 
-# 9. Answers in floating point
+# The proof ends here. What follows reads files and prints verdicts (9), and estimates errors (10).
+
+# 9. Files
 
 
-def first_step(scene: Scene, state: State, t_end: Fraction) -> tuple[str | None, list[Fraction]]:
-    """Return the wall that is met first, and t, x, y, vx, vy after it."""
-    step = next(walk(scene._replace(work=[WORK]), state, t_end, 256))
-    dt, *rest = (sum(step.numbers[name].ends, Fraction(0)) / 2 for name in NUMBERS)
-    return step.wall, [state.t + dt, *rest]
+def printable(text: str) -> str:
+    """Return a text as one line of characters that can be printed; the others are escaped."""
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text
+    )
 
 
-def backward_error(scene: Scene, state: State, t_end: Fraction, answer: Any) -> float:
-    """Estimate how far an answer to one step is from the truth, in units of 2^-53.
-
-    The truth is the middle of an enclosure with 256 bits. Each error is divided by what moves that
-    number: the sum of its changes when one input at a time grows by 2^-53 of itself, and 2^-53 of
-    the number. x and y share the larger of theirs, or 2^-53 of the way flown if that is larger; vx
-    and vy share theirs. Where what moves a number is 0 only the truth is right. The result is the
-    worst of five ratios, at most LARGE.
-
-    Raises:
-        Refused: a field is missing, or no number.
-        Contradicted: another wall is met first.
-        Unproved: 256 bits cannot tell.
-    """
-    given = [read_number(name, answer.get(name)) for name in FIELDS]
-    wall, truth = first_step(scene, state, t_end)
-    require(answer.get("wall") == wall, Contradicted(f"{wall or 'the horizon'} is met first"))
-    moves = [UNIT * abs(value) for value in truth]
-    for name in FIELDS:
-        moved = state._replace(**{name: getattr(state, name) * (1 + UNIT)})
-        other, values = first_step(scene, moved, max(t_end, moved.t))
-        require(
-            other == wall, Unproved(f"{other} is met first when {name} moves by its last place")
-        )
-        moves = [move + abs(one - two) for move, one, two in zip(moves, values, truth, strict=True)]
-    way = UNIT * max(abs(state.vx), abs(state.vy)) * (truth[0] - state.t)
-    sizes = [moves[0], *[max(*moves[1:3], way)] * 2, *[max(moves[3:])] * 2]
-    ratios = [
-        abs(one - two) / size if size else LARGE * (one != two)
-        for one, two, size in zip(given, truth, sizes, strict=True)
-    ]
-    return float(min(max(ratios), LARGE))
-
-
-def verify_answers(text: str) -> Iterator[tuple[str, Verdict]]:
-    """Judge a trajectory of floating-point numbers: each step starts from the answer before it.
-
-    "Proved" means here: the wall is proved, and the estimated backward error is at most WRONG.
+def name_of(record: Any) -> str:
+    """Return the id of a line as it is printed: between quotes, unless it looks like an id.
 
     Raises:
-        Unreadable: the text is no object with `scene`, `state`, `steps`, and maybe `t_end`.
-        Refused: the scene is invalid.
-        Unproved: whether the scene is valid is open.
+        Unreadable: the line has no id.
     """
-    data = json.loads(text, object_pairs_hook=read_object)
-    scene = read_scene(take(data, "scene", dict), [WORK])
-    t_end = read_number("t_end", data.get("t_end", 1e300))
-    steps = [take({"a step": step}, "a step", dict) for step in take(data, "steps", list)]
-    for place, (before, answer) in enumerate(
-        itertools.pairwise([take(data, "state", dict), *steps]), 1
-    ):
-        try:
-            state = read_state(scene, {name: before.get(name) for name in (*FIELDS, "wall")})
-            error = backward_error(scene, state, t_end, answer)
-            verdict = Verdict(
-                "proved" if error * UNIT <= WRONG else "false",
-                f"{answer.get('wall') or 'the horizon'}, within {error:.2g} backward ulps",
-            )
-        except (Contradicted, Undefined, Refused, Unproved) as reason:
-            verdict = Verdict(
-                "false" if isinstance(reason, Contradicted) else "not proved", str(reason)
-            )
-        yield f"step {place}", verdict
-
-
-def verify_file(path: str) -> Iterator[tuple[str, Verdict]]:
-    """Verify each line of a corpus file.
-
-    Raises:
-        Unreadable: a line is none of a corpus.
-    """
-    with Path(path).open(encoding="utf-8", newline="\n") as lines:
-        for place, line in enumerate(lines, 1):
-            record = json.loads(line, object_pairs_hook=read_object)
-            yield f"{path}:{place}: {take(record, 'id', str)}", verify_line(record)
+    name = take(record, "id", str)
+    return name if re.fullmatch(r"[\w./-]+", name, re.ASCII) else f'"{printable(name)}"'
 
 
 def read_object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return a JSON object; of a key that comes twice one value would be lost.
 
     Raises:
-        Unreadable: one does.
+        Unreadable: a key comes twice.
     """
     require(len(dict(pairs)) == len(pairs), Unreadable("a key comes twice"))
     return dict(pairs)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Verify files; return 0 when all is proved, 1 when not, 2 when something is unreadable."""
-    has_answers, statuses, path = list(arguments[:1]) == ["--answers"], [], "verify.py"
+def read_json(text: bytes) -> Any:
+    """Return what a JSON text says.
+
+    Raises:
+        Unreadable: the text is not JSON, or a key comes twice.
+    """
     try:
-        require(len(arguments) > has_answers, Unreadable("give files, or --answers and files"))
-        for path in arguments[has_answers:]:
-            for where, verdict in (
-                verify_answers(Path(path).read_text(encoding="utf-8"))
-                if has_answers
-                else verify_file(path)
-            ):
-                statuses.append(verdict.status)
-                if has_answers or verdict.status != "proved":
-                    print(f"{where}: {verdict.status}: {verdict.reason}")
-    except (OSError, ValueError, RecursionError, Refused, Unproved) as error:
-        print(f"{path}: unreadable after {len(statuses)} claims: {error}", file=sys.stderr)
-        return 2
-    print(f"{statuses.count('proved')} of {len(statuses)} proved")
-    return int(statuses.count("proved") < len(statuses))
+        return json.loads(text.decode("utf-8"), object_pairs_hook=read_object)
+    except RecursionError:
+        raise Unreadable("nested too deeply") from None
+    except json.JSONDecodeError as error:
+        is_long = error.doc.count("\n", 0, error.pos) > 0
+        line = f"line {error.lineno}, " if is_long else ""
+        raise Unreadable(f"{error.msg}, {line}column {error.colno}") from None
+    except UnicodeDecodeError as error:
+        raise Unreadable(f"byte {error.start + 1} is no UTF-8") from None
+    except ValueError as error:  # an integer of thousands of digits
+        raise Unreadable(str(error)) from None
+
+
+def read_lines(path: str) -> Iterator[tuple[str, bytes]]:
+    """Yield the lines of a file that are not blank, each with its place; "-" is standard input.
+
+    Raises:
+        Unreadable: the file cannot be read, or has no such line.
+    """
+    is_empty = True
+    try:
+        with open(0 if path == "-" else path, "rb", closefd=path != "-") as lines:
+            for number_of_line, line in enumerate(lines, 1):
+                if line.strip():
+                    is_empty = False
+                    yield f"{printable(path)}:{number_of_line}", line
+    except OSError as error:
+        raise Unreadable(f"{printable(path)}: {error.strerror}") from None
+    require(not is_empty, Unreadable(f"{printable(path)}: there is nothing to verify in this file"))
+
+
+def verify_file(path: str, digits: int | None = None) -> Iterator[tuple[str, Verdict]]:
+    """Verify each line of a corpus file.
+
+    Raises:
+        Unreadable: a line has not the form of a corpus line; the message has its number.
+    """
+    for where, line in read_lines(path):
+        try:
+            record = read_json(line)
+            name, verdict = name_of(record), verify_line(record, digits)
+        except Unreadable as error:
+            raise Unreadable(f"{where}: {error}") from None
+        yield f"{where}: {name}", verdict
+
+
+class Options(argparse.ArgumentParser):
+    """The options of the command line. A fault in them is one line, as in a file."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise what is wrong.
+
+        Raises:
+            Unreadable: always.
+        """
+        raise Unreadable(f"{message} (--help lists the options)")
+
+
+def between(low: float, high: float, kind: type) -> Callable[[str], Any]:
+    """Return a function that reads a number of the command line within two bounds."""
+
+    def read(text: str) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = None
+        if value is None or not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text!r} must be from {low:g} to {high:g}")
+        return value
+
+    return read
+
+
+def read_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the command line.
+
+    Raises:
+        Unreadable: an option is wrong.
+        SystemExit: it asks for help.
+    """
+    parser = Options(
+        prog="verify.py",
+        allow_abbrev=False,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description=(__doc__ or "").partition("\nA particle")[0],
+        epilog="Exit code: 0 all is proved (or agrees), 1 something is not, 2 bad input, 130 interrupted.",
+    )
+    add = parser.add_argument
+    add("files", nargs="+", metavar="FILE", help="JSON lines; - is standard input")
+    add(
+        "--digits", metavar="N", type=between(1, 1000, int),
+        help="demand enclosures at most 10^-N wide, relative to the larger end",
+    )  # fmt: skip
+    add("--answers", action="store_true", help="judge paths in floating point: JSON, JSONL or CSV")
+    add("--scene", metavar="FILE", help="the scene of a CSV file, as JSON")
+    add(
+        "--t-end", metavar="T", type=between(-LARGEST, LARGEST, float),
+        help="the horizon, where the file gives none",
+    )  # fmt: skip
+    add(
+        "--within", metavar="ULPS", type=between(0, LARGEST, float),
+        help=f"largest backward error that agrees, in units of 2^-53 (default: {WITHIN:.3g})",
+    )  # fmt: skip
+    add("--all", action="store_true", help="judge what follows a false step, too")
+    options = parser.parse_args(arguments)
+    given = {"--scene": options.scene, "--t-end": options.t_end, "--within": options.within}
+    given["--all"] = options.all or None
+    foreign = [name for name, value in given.items() if value is not None]
+    require(options.answers or not foreign, Unreadable(f"{foreign[:1]} goes with --answers"))
+    require(not (options.answers and options.digits), Unreadable("--digits is for proofs only"))
+    if options.within is None:
+        options.within = WITHIN
+    return options
+
+
+def run(options: argparse.Namespace, counts: dict[str, int]) -> int:
+    """Judge files, print what is not proved, and return the exit code.
+
+    Raises:
+        Unreadable: a file cannot be judged.
+    """
+    if options.answers:
+        # All files are judged, also after one in which something is false.
+        return max([judge_file(path, options, counts) for path in options.files])
+    for path in options.files:
+        for where, verdict in verify_file(path, options.digits):
+            counts["claims"] += 1
+            counts["proved"] += verdict.status == "proved"
+            if verdict.status != "proved":
+                print(printable(f"{where}: {verdict.status}: {verdict.reason}"))
+    print(f"{counts['proved']} of {counts['claims']} proved")
+    return int(counts["proved"] < counts["claims"])
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the command line.
+
+    Returns:
+        0 when all is proved, or agrees; 1 when not; 2 when something is unreadable; 130 after an
+        interrupt, and 141 when nobody reads on, as shells count it.
+    """
+    counts = {"claims": 0, "proved": 0}
+    try:
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            sys.stdout.reconfigure(errors="backslashreplace")
+        code = run(read_options(arguments), counts)
+        sys.stdout.flush()
+        return code
+    except SystemExit:  # after --help
+        return 0
+    except Unreadable as error:
+        n = counts["claims"]
+        code, words = 2, f"unreadable after {n} claims: {error}" if n else str(error)
+    except KeyboardInterrupt:
+        code, words = 130, f"interrupted after {counts['claims']} claims"
+    except OSError as error:
+        # What is still in the buffer would raise the same again when Python ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):
+            return 141
+        code, words = 2, f"cannot write the result: {error.strerror}"
+    print(printable(f"verify.py: {words}"), file=sys.stderr)
+    return code
+
+
+# 10. Answers in floating point (--answers): estimates, which prove nothing
+
+
+class Answers(NamedTuple):
+    """A path that was computed in floating point.
+
+    Attributes:
+        scene: its scene.
+        wire_scene: the same as JSON.
+        t_end: its horizon.
+        state: where it begins, as JSON.
+        steps: where it is said to lead, each with its place in the file. They are read one by one.
+    """
+
+    scene: Scene
+    wire_scene: dict[str, Any]
+    t_end: Fraction
+    state: dict[str, Any]
+    steps: Iterator[tuple[str, Any]]
+
+
+class Truth(NamedTuple):
+    """A step as it really is, from a state in floating point; and the state after it.
+
+    Attributes:
+        flight: the flight from the state.
+        hit: the wall met and when; None at the horizon.
+        numbers: dt, x, y, vx, vy at its end.
+    """
+
+    flight: Flight
+    hit: tuple[str, Interval] | None
+    numbers: list[Fraction]
+
+
+def find_truth(scene: Scene, state: State, t_end: Fraction) -> Truth:
+    """Return the step that follows a state.
+
+    Raises:
+        Refused: the state is bad.
+        Undefined: the motion has no next step.
+        Unproved: 256 bits cannot tell what comes next.
+    """
+    question = Unproved("nothing was tried")
+    for bits in PRECISIONS[:2]:
+        try:
+            flight, in_cap = start(scene._replace(work=[WORK]), state, t_end, bits)
+            hit = flight.event(in_cap=in_cap)
+        except Unproved as failure:
+            question = failure
+        else:
+            return Truth(flight, hit, arrive(flight, hit))
+    raise question
+
+
+def arrive(flight: Flight, hit: tuple[str, Interval] | None) -> list[Fraction]:
+    """Return dt, x, y, vx, vy at the end of a flight: the lower ends of narrow enclosures."""
+    if hit is not None:
+        numbers, _ = bounce(flight, hit)
+        return [numbers[name].ends[0] for name in NUMBERS]
+    (x, y, vx, vy), end = flight.line, number(flight.end, flight.bits)
+    return [part.ends[0] for part in (end, x + vx * end, y + vy * end, vx, vy)]
+
+
+def move_input(truth: Truth, name: str) -> list[Fraction]:
+    """Return what the end of a step becomes when one number of its start grows by 2^-53 of itself.
+
+    The same wall is met. One step of Newton's method finds when: what it leaves is of second order.
+    """
+    flight, hit = truth.flight, truth.hit
+    assert flight.state is not None
+    value = getattr(flight.state, name)
+    state = flight.state._replace(**{name: value * (1 + UNIT)})
+    scene, bits, zero = flight.scene, flight.bits, flight.clock.zero
+    end = max(flight.end - (state.t - flight.state.t), Fraction(0))
+    clock = Clock(scene, state.t, bits) if name == "t" else flight.clock
+    x, y, vx, vy = (number(value, bits) for value in state[1:5])
+    moved = Flight(clock, (x, y, vx, vy), end, zero, flight.wall, state=state)
+    if name != "t":
+        moved._laws = flight._laws
+    if moved.wall is not None:
+        moved.residual = moved.f(moved.wall, zero).f
+    if hit is None:
+        return arrive(moved, None)
+    wall, root = hit
+    near = root.simplest()
+    jet = moved.f(wall, near)
+    return arrive(moved, (wall, (near - jet.f / jet.d1).low))
+
+
+def measure_sizes(truth: Truth, state: State) -> dict[str, Fraction]:
+    """Return the unit in which the error of each number is counted: one backward ulp.
+
+    It is 2^-53 of the number, plus the sum of its changes when one number of the start at a time
+    grows by 2^-53 of itself. x and y share the larger of theirs, or 2^-53 of the way flown if that
+    is larger; vx and vy share theirs.
+    """
+    sizes = [UNIT * abs(value) for value in truth.numbers]
+    for name in FIELDS:
+        if getattr(state, name):
+            moved = move_input(truth, name)
+            changes = (abs(a - b) for a, b in zip(moved, truth.numbers, strict=True))
+            sizes = [size + change for size, change in zip(sizes, changes, strict=True)]
+    dt = truth.numbers[0]
+    way = UNIT * max(abs(state.vx), abs(state.vy)) * dt
+    place, speed = max(*sizes[1:3], way), max(sizes[3:])
+    t = sizes[0] + UNIT * (abs(state.t) + abs(state.t + dt))
+    return {"t": t, "dt": sizes[0], "x": place, "y": place, "vx": speed, "vy": speed}
+
+
+def read_answer(answer: Any) -> dict[str, Fraction]:
+    """Return the numbers of a step: t, x, y, vx, vy, and dt where it is given.
+
+    Raises:
+        Contradicted: a field is missing, unknown, or no finite number; or the outcome is another.
+    """
+    require(isinstance(answer, dict), Contradicted("the step is no object"))
+    for name in answer:
+        is_known = name in (*FIELDS, "dt", "wall", "outcome")
+        require(is_known, Contradicted(f"{name} is an unknown field"))
+    is_end = answer.get("outcome") == "horizon"
+    for name in (*FIELDS, *([] if is_end else ["wall"])):
+        require(name in answer, Contradicted(f"{name} is missing"))
+    outcome = "horizon" if answer.get("wall") is None else "collision"
+    is_right = answer.get("outcome", outcome) == outcome
+    require(is_right, Contradicted("outcome and wall contradict each other"))
+    numbers = {}
+    for name in (*FIELDS, "dt"):
+        if name in answer:
+            try:
+                numbers[name] = read_number(name, answer[name])
+            except Refused:
+                value = repr(answer[name])[:40]
+                raise Contradicted(f"{name} = {value} is no finite number") from None
+    return numbers
+
+
+def measure_errors(scene: Scene, state: State, t_end: Fraction, answer: Any) -> dict[str, float]:
+    """Estimate the error of each number of a step, with its sign, in backward ulps.
+
+    dt is judged beside t: late in a path a large error of dt is a small one of t. An answer without
+    dt gives it as the difference of two times. The last is rounded, so that TICKS units of it are
+    no error of dt. A clock that does not go on is false however late it is.
+
+    Raises:
+        Contradicted: a field is wrong, another wall is met first, or the clock stands still.
+        Refused, Undefined, Unproved: the step is open.
+    """
+    given = read_answer(answer)
+    truth = find_truth(scene, state, t_end)
+    dt, x, y, vx, vy = truth.numbers
+    wall, right = answer.get("wall"), truth.hit[0] if truth.hit else None
+    if wall != right:
+        require_not_close(scene, state, t_end, wall)
+        raise Contradicted(f"{right or 'the horizon'} is met first, not {wall or 'the horizon'}")
+    t = state.t + dt
+    unit = 2 * UNIT * abs(t)
+    stands = given["t"] <= state.t and dt > unit
+    require(not stands, Contradicted("t does not grow, and the flight takes time"))
+    sizes = measure_sizes(truth, state)
+    right_numbers = {"t": t, "dt": dt, "x": x, "y": y, "vx": vx, "vy": vy}
+    wrong = {name: given[name] - right_numbers[name] for name in given}
+    if "dt" not in given:
+        late = wrong["t"]
+        wrong["dt"] = max(abs(late) - TICKS * unit, Fraction(0)) * (1 if late > 0 else -1)
+    return {name: ratio(wrong[name], size) for name, size in sizes.items()}
+
+
+def ratio(error: Fraction, size: Fraction) -> float:
+    """Return an error in units, at most LARGE. Where nothing moves a number only 0 is no error."""
+    if size == 0:
+        return float(LARGE) * ((error > 0) - (error < 0))
+    return float(max(-LARGE, min(error / size, LARGE)))
+
+
+def require_not_close(scene: Scene, state: State, t_end: Fraction, wall: Any) -> None:
+    """Require that a wall is not met first when one number of the start moves by its last place.
+
+    Raises:
+        Unproved: the wall is met first then, so in floating point both walls are right.
+    """
+    for name, sign in itertools.product(FIELDS, (1, -1)):
+        moved = state._replace(**{name: getattr(state, name) * (1 + sign * 2 * UNIT)})
+        try:
+            hit = find_truth(scene, moved, max(t_end, moved.t)).hit
+        except (Refused, Undefined, Unproved):
+            continue
+        is_close = (hit[0] if hit else None) == wall
+        require(not is_close, Unproved(f"which wall is first hangs on the last place of {name}"))
+
+
+class Tally:
+    """The errors of one number over a path: the worst, the mean, and the mean with signs.
+
+    A step that is wrong by as much in the same direction each time is a bias. It adds up over a
+    path, while errors of both signs cancel. `outward` takes an error as positive where the number
+    is too large in size: a factor of all velocities shows there, and a constant shows in `signed`.
+    """
+
+    def __init__(self) -> None:
+        """Begin with no step."""
+        self.n, self.total, self.worst, self.place = 0, 0.0, 0.0, "-"
+        self.sums = {"signed": (0.0, 0.0), "outward": (0.0, 0.0)}
+
+    def add(self, place: str, error: float, given: float) -> None:
+        """Count the error of a step, whose answer is given."""
+        self.n += 1
+        self.total += abs(error)
+        if abs(error) > self.worst:
+            self.worst, self.place = abs(error), place
+        for kind, value in (("signed", error), ("outward", error if given >= 0 else -error)):
+            total, squares = self.sums[kind]
+            self.sums[kind] = total + value, squares + value * value
+
+    def mean(self, kind: str) -> float:
+        """Return the mean error with its sign."""
+        return self.sums[kind][0] / max(self.n, 1)
+
+    def is_biased(self, kind: str) -> bool:
+        """Tell whether a mean is over one ulp and over FIVE standard errors, from 8 steps on."""
+        mean, squares = self.mean(kind), self.sums[kind][1]
+        spread = max(squares / max(self.n, 1) - mean * mean, 0.0) / max(self.n - 1, 1)
+        return self.n >= 8 and abs(mean) > 1 and mean * mean > 25 * spread
+
+
+class Report:
+    """What is known of a path after some of its steps.
+
+    Attributes:
+        counts: how many steps agree, are false, or are open.
+        tallies: the errors of each number, over the steps that are not open.
+        first_false: the place of the first false step, from 0; None if there is none.
+    """
+
+    def __init__(self, within: float) -> None:
+        """Begin with no step; an error up to `within` backward ulps agrees."""
+        self.within, self.counts = within, {"agrees": 0, "false": 0, "open": 0}
+        self.tallies = {name: Tally() for name in ("t", "dt", "x", "y", "vx", "vy")}
+        self.first_false: int | None = None
+
+    @property
+    def n_steps(self) -> int:
+        """Return how many steps were judged."""
+        return sum(self.counts.values())
+
+    def judge(self, answers: Answers, before: Any, place: str, answer: Any) -> Verdict:
+        """Judge one step from the answer before it, and count it."""
+        verdict = self._judge(answers, before, place, answer)
+        if verdict.status == "false" and self.first_false is None:
+            self.first_false = self.n_steps
+        self.counts[verdict.status] += 1
+        return verdict
+
+    def _judge(self, answers: Answers, before: Any, place: str, answer: Any) -> Verdict:
+        is_state = isinstance(before, dict) and {*FIELDS} <= set(before)
+        try:
+            require(is_state, Unproved("the step before cannot be read"))
+            fields = {name: before.get(name) for name in (*FIELDS, "wall")}
+            state = read_state(answers.scene, fields)
+            errors = measure_errors(answers.scene, state, answers.t_end, answer)
+        except Contradicted as reason:
+            return Verdict("false", str(reason))
+        except Undefined as reason:
+            return Verdict("open", f"the motion has no next step ({reason})")
+        except (Refused, Unproved) as reason:
+            return Verdict("open", str(reason))
+        for name, error in errors.items():
+            self.tallies[name].add(place, error, float(answer.get(name, 1.0)))
+        worst = max(errors, key=lambda name: abs(errors[name]))
+        wall = answer.get("wall") or "the horizon"
+        words = f"{wall}, {worst} within {abs(errors[worst]):.2g} backward ulps"
+        return Verdict("agrees" if abs(errors[worst]) <= self.within else "false", words)
+
+    def lines(self) -> Iterator[str]:
+        """Yield the summary: a table of errors, each bias, and how many steps agree."""
+        yield "in backward ulps  worst     mean      mean signed  mean outward  worst at"
+        for name, tally in self.tallies.items():
+            numbers = f"{tally.worst:<10.3g}{tally.total / max(tally.n, 1):<10.3g}"
+            means = f"{tally.mean('signed'):<13.3g}{tally.mean('outward'):<14.3g}"
+            yield f"{name:<18}{numbers}{means}{tally.place}"
+        for name, tally in self.tallies.items():
+            for kind in ("signed", "outward"):
+                if tally.is_biased(kind):
+                    size = f"{tally.mean(kind):+.3g} backward ulps a step ({kind} mean)"
+                    yield f"bias: {name} is wrong by {size} over {tally.n} steps"
+        within = f"agree within {self.within:.3g} backward ulps"
+        others = "".join(f", {self.counts[name]} {name}" for name in ("false", "open"))
+        yield f"{self.counts['agrees']} of {self.n_steps} {within}{others}"
+
+
+def judge_path(
+    answers: Answers, report: Report, *, is_all: bool = False
+) -> Iterator[tuple[str, Verdict]]:
+    """Judge each step from the answer before it, up to the first false one or, if asked, all."""
+    before: Any = answers.state
+    for place, answer in answers.steps:
+        verdict = report.judge(answers, before, place, answer)
+        yield place, verdict
+        if verdict.status == "false" and not is_all:
+            return
+        before = answer
+
+
+def judge_file(path: str, options: argparse.Namespace, counts: dict[str, int]) -> int:
+    """Judge a path, print what does not agree and a summary, and return the exit code.
+
+    Raises:
+        Unreadable: the file does not hold a path.
+    """
+    answers = read_answers(path, options.scene, options.t_end)
+    report, begin = Report(options.within), time.monotonic()
+    told = begin
+    for place, verdict in judge_path(answers, report, is_all=options.all):
+        counts["claims"] += 1
+        if verdict.status != "agrees":
+            print(printable(f"{path}: {place}: {verdict.status}: {verdict.reason}"))
+        if time.monotonic() > told + PULSE:
+            told = time.monotonic()
+            words = f"{report.n_steps} steps judged in {told - begin:.0f} s"
+            print(printable(f"{path}: {words}"), file=sys.stderr, flush=True)
+    require(report.n_steps, Unreadable(f"{printable(path)}: there is no step to judge"))
+    for line in report.lines():
+        print(printable(line))
+    if report.counts["false"] and not options.all:
+        print("stopped at the first false step; --all judges the others, too")
+    return int(report.counts["agrees"] < report.n_steps)
+
+
+def read_answers(path: str, scene_path: str | None = None, t_end: float | None = None) -> Answers:
+    """Read a path in floating point.
+
+    JSON: an object with `scene`, `state`, `steps`, and maybe `t_end`. JSON lines: the first has all
+    but `steps`, each further one is a step. CSV: each row is a state, the first row is the start,
+    and the scene is another file.
+
+    Raises:
+        Unreadable: the file has another form, or its scene or its start is refused.
+    """
+    lines = read_lines(path)
+    is_table = path.endswith(".csv")
+    require(is_table == (scene_path is not None), Unreadable("--scene goes with each CSV file"))
+    if is_table:
+        scene = read_whole(read_lines(str(scene_path)))
+        rows = read_rows(lines)
+        _, first = next(rows, ("", {}))
+        return build_answers({"scene": scene, "state": first}, t_end, rows)
+    where, text = next(lines)
+    try:
+        head = read_json(text)
+    except Unreadable:
+        head = {"steps": []}  # the first line is not all of it
+    if not isinstance(head, dict) or "steps" in head:
+        head = read_whole(itertools.chain([(where, text)], lines))
+        places = enumerate(take(head, "steps", list), 1)
+        return build_answers(head, t_end, ((f"step {k}", step) for k, step in places))
+    return build_answers(head, t_end, read_steps(lines))
+
+
+def read_whole(lines: Iterable[tuple[str, bytes]]) -> Any:
+    """Return what a file says that is one JSON text."""
+    parts = [text for _, text in lines]
+    return read_json(b"".join(parts))
+
+
+def read_steps(lines: Iterable[tuple[str, bytes]]) -> Iterator[tuple[str, Any]]:
+    """Yield a step for each line of JSON, with its place."""
+    for k, (where, text) in enumerate(lines, 1):
+        try:
+            yield f"step {k}", read_json(text)
+        except Unreadable as error:
+            raise Unreadable(f"{where}: {error}") from None
+
+
+def read_rows(lines: Iterable[tuple[str, bytes]]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the rows of a CSV file, the start as step 0. An empty wall is the horizon.
+
+    Raises:
+        Unreadable: a row has too few or too many cells, or the first row does not name the columns.
+    """
+    names: list[str] = []
+    for where, line in lines:
+        try:
+            text = line.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise Unreadable(f"{where}: this is no UTF-8") from None
+        if text.startswith("#"):
+            continue
+        cells = [cell.strip() for cell in next(csv.reader([text]))]
+        if not names:
+            names, place = cells, 0
+            missing = [name for name in (*FIELDS, "wall") if name not in names]
+            unknown = [name for name in names if name not in (*FIELDS, "wall", "dt")]
+            require(not missing, Unreadable(f"{where}: column {missing[:1]} is missing"))
+            require(not unknown, Unreadable(f"{where}: column {unknown[:1]} is unknown"))
+            continue
+        is_row = len(cells) == len(names)
+        require(is_row, Unreadable(f"{where}: {len(cells)} cells, must be {len(names)}"))
+        row = {name: read_cell(name, cell) for name, cell in zip(names, cells, strict=True)}
+        yield f"step {place}", row
+        place += 1
+
+
+def read_cell(name: str, cell: str) -> Any:
+    """Return a number or a wall; what is no number stays a text, and is no finite number then."""
+    if name == "wall":
+        return cell or None
+    try:
+        return float.fromhex(cell) if "x" in cell.lower() else float(cell)
+    except (ValueError, OverflowError):
+        return cell
+
+
+def build_answers(
+    head: dict[str, Any], t_end: float | None, steps: Iterator[tuple[str, Any]]
+) -> Answers:
+    """Return a path whose scene is proved to be valid, and whose start has all fields.
+
+    Raises:
+        Unreadable: a field is missing or unknown, or the scene or the start is refused.
+    """
+    unknown = [name for name in head if name not in ("scene", "state", "t_end", "steps")]
+    require(not unknown, Unreadable(f"{unknown[:1]} is an unknown field of a path"))
+    try:
+        scene = read_scene(take(head, "scene", dict), [WORK])
+        end = read_number("t_end", head.get("t_end", FAR if t_end is None else t_end))
+        state = take(head, "state", dict)
+        read_state(scene, {name: state[name] for name in state if name != "dt"})
+    except (Refused, Unproved) as failure:
+        raise Unreadable(str(failure)) from None
+    return Answers(scene, head["scene"], end, state, steps)
 
 
 if __name__ == "__main__":

@@ -451,21 +451,31 @@ def check(
 
 @app.command(epilog="Example: mushrooms verify steps.csv --scene moving-cap --picture false.svg")
 def verify(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A CSV file, or JSON as in docs/corpus.md.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A CSV file, or JSON or JSON lines as in docs/corpus.md.")
+    ],
     scene: Annotated[
         str | None, typer.Option(metavar="SCENE", help="Scene of a CSV file. Its first row is the start.")
     ] = None,
     picture: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the first false step (.svg).")
     ] = None,
+    t_end: Annotated[
+        float | None, typer.Option(metavar="T", help="Horizon, where the file gives none.")
+    ] = None,
+    within: Annotated[
+        float, typer.Option(metavar="ULPS", help="Largest backward error that agrees, in units of 2^-53.")
+    ] = 1e-9 * 2.0**53,
+    is_all: Annotated[bool, typer.Option("--all", help="Judge what follows a false step, too.")] = False,
 ) -> int:
     """Check a trajectory computed in floating point. Each step is judged from the state before it.
 
-    Exit code 0 if every step is within the bound of errors, 1 if one is not or is open, 2 on bad input.
+    The errors are estimates, not proofs. At the end the worst and the mean errors are printed, and each bias
+    over the path. Exit code 0 if every step agrees, 1 if one does not, 2 on bad input.
     """
     from mushrooms.questions import verify_file
 
-    return verify_file(file, scene, picture)
+    return verify_file(file, scene, picture, t_end, within, is_all)
 
 
 @app.command(epilog="Example: mushrooms ask near-corner/3 -- ./my_stepper")

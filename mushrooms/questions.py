@@ -4,6 +4,8 @@ A question is a case of the test suite, a draw of a family of nasty questions, o
 """
 
 import json
+import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -168,31 +170,67 @@ def _print(tallies: list[Any]) -> None:
 FIELDS = ("t", "x", "y", "vx", "vy")
 
 
-def verify_file(file: Path, scene: str | None, picture: Path | None) -> int:
-    """Judge each step of a trajectory from the state before it, and return the exit code."""
+def verify_file(
+    file: Path, scene: str | None, picture: Path | None, t_end: float | None, within: float, is_all: bool
+) -> int:
+    """Judge a trajectory, each step from the state before it, and return the exit code."""
     check_file(picture, (".svg",))
     label = f"trajectory {str(file)!r}"
     if (file.suffix == ".csv") != (scene is not None):
         raise BadInput(f"{label}: a CSV file needs --scene, a JSON file has its own")
-    rows = None if scene is None else _of_rows(file, label, scene)
+    if within < 0 or not math.isfinite(within):
+        raise BadInput(f"--within = {within}, must be a finite number >= 0")
     try:
-        text = file.read_text("utf-8") if rows is None else json.dumps(rows)
-        verdicts = list(verifier.verify_answers(text))
-    except (verifier.Refused, verifier.Unproved, ValueError, RecursionError) as error:
+        if scene is None:
+            answers = verifier.read_answers(str(file), t_end=t_end)
+        else:
+            head, rows = _of_rows(file, label, scene)
+            steps = ((f"step {number}", row) for number, row in enumerate(rows, 1))
+            answers = verifier.build_answers(head, t_end, steps)
+        report = verifier.Report(within)
+        false = _judge(answers, report, is_all)
+    except ValueError as error:
         raise BadInput(f"{label}: {error}") from None
-    for place, verdict in verdicts:
-        print(f"{place}: {verdict.status}: {verdict.reason}")
-    n_proved = sum(verdict.status == "proved" for _, verdict in verdicts)
-    print(f"{n_proved} of {len(verdicts)} proved")
-    wrong = next((i for i, (_, verdict) in enumerate(verdicts) if verdict.status == "false"), None)
-    if picture is not None and wrong is not None:
-        write_file(picture, _draw(json.loads(text), wrong))
-        print(f"Picture of step {wrong + 1}: {picture}")
-    return int(n_proved < len(verdicts))
+    if not report.n_steps:
+        raise BadInput(f"{label}: there is no step to judge")
+    for line in report.lines():
+        print(line)
+    if picture is not None and false is not None:
+        write_file(picture, _draw(answers, *false))
+        print(f"Picture of {false[0]}: {picture}")
+    return int(report.counts["agrees"] < report.n_steps)
 
 
-def _of_rows(file: Path, label: str, scene: str) -> dict[str, Any]:
-    """Return a CSV file as the verifier takes a trajectory; each row but the first names the wall it hit."""
+def _judge(
+    answers: verifier.Answers, report: verifier.Report, is_all: bool
+) -> tuple[str, dict[str, Any], dict[str, Any]] | None:
+    """Judge steps, print those that do not agree, and return the first false one: place, start, answer."""
+    seen = [answers.state]
+
+    def remembered() -> Iterator[tuple[str, Any]]:
+        for place, answer in answers.steps:
+            seen[:] = [seen[-1], answer]
+            yield place, answer
+
+    false = None
+    with progress_bar() as bar:
+        task = bar.add_task("verify", total=None)
+        for place, verdict in verifier.judge_path(
+            answers._replace(steps=remembered()), report, is_all=is_all
+        ):
+            bar.advance(task)
+            if verdict.status != "agrees":
+                print(verifier.printable(f"{place}: {verdict.status}: {verdict.reason}"))
+            if verdict.status == "false" and false is None:
+                false = place, seen[0], seen[1]
+    return false
+
+
+def _of_rows(file: Path, label: str, scene: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return a CSV file as the verifier takes a trajectory: its scene and start, and its steps.
+
+    Each row but the first names the wall that was hit.
+    """
     of = scene_named(scene)
     check_digest(file, label)
     states: list[dict[str, Any]] = []
@@ -204,17 +242,20 @@ def _of_rows(file: Path, label: str, scene: str) -> dict[str, Any]:
         states.append({**numbers, "wall": row["wall"] or None})
     if not states:
         raise BadInput(f"{label}: there is no row")
-    return {"scene": wire_form(of), "state": states[0], "steps": states[1:]}
+    return {"scene": wire_form(of), "state": states[0]}, states[1:]
 
 
-def _draw(data: dict[str, Any], at: int) -> bytes:
+def _draw(answers: verifier.Answers, place: str, begin: dict[str, Any], given: Any) -> bytes:
     """Draw a step as it was given, and as the reference has it."""
     from mushrooms.reports import check_page  # drawing takes a second to import
 
-    begin = data["steps"][at - 1] if at else data["state"]
-    state = msgspec.convert({name: begin.get(name) for name in (*FIELDS, "wall")}, State)
-    given, scene = data["steps"][at], from_data(data["scene"])
-    found = reference.next_collision(scene, state, float(data.get("t_end", 1e300)))
+    scene = from_data(answers.wire_scene)
+    try:
+        state = msgspec.convert({name: begin.get(name) for name in (*FIELDS, "wall")}, State)
+        verifier.read_answer(given)
+        found = reference.next_collision(scene, state, float(answers.t_end))
+    except (msgspec.ValidationError, verifier.Contradicted) as error:
+        raise BadInput(f"--picture: {place} has no state to draw: {error}") from None
     if not isinstance(found, reference.Collision | reference.Horizon):
-        raise BadInput(f"--picture: step {at + 1} from {shown(str(state))} has no certified end to draw")
-    return check_page.draw_step(scene, state, found.rounded(), given, at + 1)
+        raise BadInput(f"--picture: {place} from {shown(str(state))} has no certified end to draw")
+    return check_page.draw_step(scene, state, found.rounded(), given, place)

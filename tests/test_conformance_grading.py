@@ -425,9 +425,12 @@ def test_backward_ulps_of_known_errors():
     [
         ([], "A"),
         ([0.0, 4.0, math.nan], "A"),
+        ([math.nan, 0.0, 4.0], "A"),
+        ([math.nan, 5.0, math.nan], "B"),
+        ([math.nan, math.nan], "A"),
         ([4.1], "B"),
         ([1.0, 1e4], "B"),
-        ([1.0001e4], "C"),
+        ([5.0, 1.0001e4, 1.0], "C"),
         ([1.0, math.inf], "C"),
     ],
 )

@@ -4,7 +4,7 @@ import json
 import math
 import re
 import secrets
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -17,9 +17,11 @@ from support.faulty_servers import FAULTS, HONEST, command
 from support.faulty_steppers import clock, faulty
 from support.schemas import validator
 
+import scene as scenes
 from conformance import vectors
 from conformance.mutants.kill_matrix import diagnose
 from conformance.suite import reports, run as suite
+from conformance.suite.checks import form
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import VERDICTS, Result, Run
 from conformance.suite.run import Transform
@@ -549,3 +551,47 @@ def test_known_failures_are_marked_in_a_run(monkeypatch):
     fixed = frozenset({"made-up/0", "made-up/1", "protocol/stop"})
     run = suite.check(command("crash-at-second"), known=fixed)
     assert run.objections() == ["made-up/0: passes, though it is listed as a known failure"]
+
+
+FLYING, MET = State(0.0, 0.0, 0.5, 0.0, 1.0), {"outcome": "collision", "wall": "arc", "dt": 0.5}
+ENDS = {
+    "collision": [MET | {"t": 0.5 * (k + 1), "x": 0.0, "y": 1.0, "vx": 0.0, "vy": -1.0} for k in range(9)],
+    "horizon": [{"outcome": "horizon", "t": 9.0, "x": 0.0, "y": 0.5, "vx": 0.0, "vy": 1.0}] * 9,
+    "undefined": [{"outcome": "undefined", "reason": "corner"}] * 9,
+}
+
+
+@pytest.mark.parametrize("n", [0, 1, 3])
+@pytest.mark.parametrize("hits", [0, 2, 9])
+@pytest.mark.parametrize("end", ["horizon", "undefined"])
+def test_a_path_is_asked_step_by_step_until_it_ends(n, hits, end):
+    """Nothing is asked after what is no collision, and no more than is wanted."""
+    answers = [*ENDS["collision"][:hits], *ENDS[end]]
+    asked = []
+
+    def ask(request):
+        asked.append(request["state"])
+        return answers[len(asked) - 1]
+
+    stepper = form.Implementation(SimpleNamespace(ask=ask), "step")
+    found = stepper.path(scenes.Cap(r=1.0), FLYING, n, 9.0)
+    assert len(asked) == len(found) == min(n, hits + 1)
+    kinds = [type(one).__name__.lower() for one in found]
+    assert kinds == (["collision"] * hits + [end])[:n]
+    assert [state["t"] for state in asked] == [0.5 * k for k in range(len(asked))]
+
+
+@pytest.mark.parametrize(
+    ("n", "steps", "is_right"),
+    [
+        (2, ENDS["collision"][:2], True), (2, [*ENDS["collision"][:1], ENDS["horizon"][0]], True),
+        (2, ENDS["collision"][:1], False), (2, ENDS["collision"][:3], False), (2, [], False),
+        (3, [ENDS["horizon"][0], *ENDS["collision"][:1]], False), (0, [], True),
+        (3, [*ENDS["collision"][:1], ENDS["horizon"][0], ENDS["horizon"][0]], False),
+    ],
+)  # fmt: skip
+def test_a_trajectory_of_too_many_or_too_few_steps_is_seen(n, steps, is_right):
+    session = SimpleNamespace(ask=lambda _: {"steps": steps})
+    stepper = form.Implementation(session, "trajectory")
+    with nullcontext() if is_right else pytest.raises(CheckFailure, match=f"{len(steps)} steps, "):
+        assert len(stepper.path(scenes.Cap(r=1.0), FLYING, n, 9.0)) == len(steps)

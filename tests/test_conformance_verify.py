@@ -1,4 +1,4 @@
-"""The verifier: its arithmetic against exact numbers, Arb and mpmath; forged claims; files.
+"""The verifier: its arithmetic against exact numbers, Arb and mpmath; forged claims; needed requirements.
 
 Its requirements are needed: without one of these it proves a claim that it refuses. A requirement is a piece
 of `conformance/verify.py`, and what stands there without it. The weaker verifier answers a question; that
@@ -6,11 +6,8 @@ answer, written as a line of a corpus, is the forgery. Other rows change one fie
 """
 
 import itertools
-import json
 import operator
 import os
-import subprocess
-import sys
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -20,7 +17,7 @@ from typing import Any
 
 import flint
 import pytest
-from support.forged_claims import CORPUS, KINDS, REFUSALS, draw, judge, lines, plain, pool
+from support.forged_claims import KINDS, REFUSALS, draw, judge, lines, plain, pool
 
 from conformance import verify
 from conformance.vectors import certified
@@ -30,7 +27,7 @@ from scene.precision import decimals
 from scene.tables import laws
 
 N_CASES = int(os.environ.get("MUSHROOMS_INTERVALS", 1_500))
-N_FORGERIES = int(os.environ.get("MUSHROOMS_FORGERIES", 36))
+N_FORGERIES = int(os.environ.get("MUSHROOMS_FORGERIES", 66))
 BITS = (24, 53, 128, 256, 512)
 DECIMALS = 250
 
@@ -128,14 +125,21 @@ def round_inwards(lo: int, hi: int, exp: int, bits: int) -> verify.Interval:
 
 @pytest.mark.parametrize("check", CHECKS)
 def test_a_number_that_is_lost_is_seen(check, monkeypatch):
-    verify.pi.cache_clear()
+    """Rounded inwards, an interval may also be empty; then a phase or a sign is open."""
+    random, n_seen = Random(check.__name__), 0
     monkeypatch.setattr(verify, "rounded", round_inwards)
-    monkeypatch.setattr(verify, "pi", verify.pi.__wrapped__)  # a false pi stays in no cache
-    with pytest.raises(AssertionError):
-        test_arithmetic_loses_no_number(check)
+    monkeypatch.setattr(verify, "pi", verify.pi.__wrapped__)
+    for _ in range(N_CASES // len(CHECKS)):
+        try:
+            check(random, random.choice(BITS))
+        except AssertionError:
+            n_seen += 1
+        except verify.Unproved:
+            continue
+    assert n_seen > 0
     monkeypatch.undo()
     for bits in BITS:
-        test_pi_lies_within(bits + 8)  # as sines ask for it
+        test_pi_lies_within(bits + 8)  # as sines ask for it: a false pi stays in no cache
 
 
 def test_no_forgery_is_accepted(tally):
@@ -155,110 +159,49 @@ def test_a_line_has_one_budget_of_work(monkeypatch):
     assert verify.verify_line(line) == verify.Verdict("not proved", "the search takes too long")
 
 
+def vertical_flow(n: int) -> dict[str, Any]:
+    """Return the true flow of n steps of a particle on the axis of a mushroom at rest: x = vx = 0."""
+    t_end = 2.0 * n - 2.25
+    is_up = n % 2 == 0
+    y, vy = ("-0.75", "1") if is_up else ("0.75", "-1")
+    null = ["0", "0"]
+    step = {"dt": [str(t_end)] * 2, "x": null, "y": [y] * 2, "vx": null, "vy": [vy] * 2}
+    return {
+        "id": "a/1", "kind": "flow", "scene": {"table": "mushroom", "r": 1.0, "w": 0.5, "h": 1.0},
+        "state": {"t": 0, "x": 0, "y": 0.5, "vx": 0, "vy": -1.0}, "t_end": t_end, "collisions": n,
+        "expect": [{"outcome": "horizon", "steps": [step]}],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("n", [201, pytest.param(16_001, marks=pytest.mark.deep)])
+def test_a_long_flow_along_the_axis_is_proved(n):
+    assert verify.verify_line(vertical_flow(n)) == verify.Verdict("proved")
+
+
+def test_zero_keeps_its_exponent():
+    """It fell by 127 a bounce, and sums shifted ever longer integers: 16,001 steps took a minute."""
+    line = vertical_flow(201)
+    scene = verify.read_scene(line["scene"], [verify.WORK])
+    path = verify.walk(scene, verify.read_state(scene, line["state"]), Fraction(line["t_end"]), 128)
+    for step in path:
+        assert max(abs(number.exp) for number in step.numbers.values()) < 1_000
+    for a, b in itertools.product((verify.Interval(0, 0, -5_000, 64), verify.number(3, 64)), repeat=2):
+        if 0 in (a.lo, b.lo):
+            assert (a * b).exp == 0
+
+
+def test_work_grows_with_precision():
+    """With 4,096 bits a part takes some ten times as long as with 128."""
+    line = vertical_flow(5)
+    spent = []
+    for bits in (128, 4096):
+        work = [verify.WORK]
+        verify.check_line(line, lambda work=work: verify.read_scene(line["scene"], work), bits)
+        spent.append(verify.WORK - work[0])
+    assert 8 * spent[0] < spent[1] < 64 * spent[0]
+
+
 CAP: dict[str, Any] = {"table": "cap", "r": 1.0}
-DOWN = {"t": 0, "x": 0, "y": 0.5, "vx": 0, "vy": -1.0}
-UP = {"t": 0.5, "x": 0, "y": 0, "vx": 0, "vy": 1.0, "wall": "base"}
-ASIDE = {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 0.75, "vy": 1.0}
-ARC = {
-    "t": 0.4431513611335565, "x": 0.3323635208501674, "y": 0.9431513611335565,
-    "vx": -0.042636479149832596, "vy": -1.2492726406376256, "wall": "arc",
-}  # fmt: skip
-LATE = {**DOWN, "t": 0.25, "y": 0.25}
-FALLING = {**DOWN, "t": -0.5}
-TINY = {"table": "cap", "r": 2.0**-130}
-ANSWERS: list[tuple[dict[str, Any], int, str]] = [
-    ({"scene": CAP, "state": DOWN, "steps": [UP]}, 0, "base, within 0 backward ulps"),
-    ({"scene": CAP, "state": ASIDE, "steps": [ARC]}, 0, "arc, within 0."),
-    ({"scene": CAP, "state": DOWN, "t_end": 0.25, "steps": [LATE]}, 0, "the horizon, within 0"),
-    ({"scene": CAP, "state": ASIDE, "steps": [{**ARC, "t": 0.4431515}]}, 1, "step 1: false: arc, within"),
-    (
-        {"scene": CAP, "state": ASIDE, "steps": [{**ARC, "wall": "base"}]},
-        1,
-        "step 1: false: arc is met first",
-    ),
-    (
-        {"scene": CAP, "state": ASIDE, "steps": [ARC, {**ARC, "t": 2.4}]},
-        1,
-        "step 2: false: base is met first",
-    ),
-    (
-        {
-            "scene": TINY,
-            "state": {**DOWN, "y": 2.0**-131, "vy": -(2.0**-130)},
-            "steps": [{**UP, "x": 2.0**-131, "vy": 2.0**-130}],
-        },
-        1,
-        "step 1: false",
-    ),
-    ({"scene": CAP, "state": FALLING, "steps": [{**UP, "t": 0.0, "x": 1e-16}]}, 0, "base, within"),
-    ({"scene": CAP, "state": LATE, "t_end": 0.25, "steps": [LATE]}, 0, "the horizon, within 0"),
-    ({"scene": CAP, "state": DOWN, "steps": [{**UP, "t": float("inf")}]}, 1, "t is no finite number"),
-    ({"scene": CAP, "state": DOWN, "steps": [5]}, 2, "a step must be given, as a dict"),
-    ({"scene": {"table": "cap", "r": -1.0}, "state": DOWN, "steps": []}, 2, "r breaks its bound"),
-    ({"scene": CAP, "state": DOWN}, 2, "steps must be given, as a list"),
-]
-LINE = {
-    "id": "a/1", "kind": "step", "scene": CAP, "state": DOWN, "t_end": 9.0,
-    "expect": [{"outcome": "collision", "steps": [{
-        "wall": "base", "dt": ["0.5", "0.5"], "x": ["0", "0"], "y": ["0", "0"], "vx": ["0", "0"],
-        "vy": ["1", "1"],
-    }]}],
-}  # fmt: skip
-# It is on the left side at an irrational phase, as far as any precision shows, and far below the floor.
-SWELLING = {"kind": "fourier", "mean": 1.0, "period": 2.0, "sin": [0.25]}
-REFUSED = {
-    **LINE, "scene": {"table": "stem", "w": SWELLING, "h": 1.0}, "expect": [{"outcome": "rejected"}],
-    "state": {**DOWN, "t": 0.5, "x": -1.25, "y": -2.0},
-}  # fmt: skip
-FILES: list[tuple[str, int, str]] = [
-    (json.dumps(LINE), 0, "1 of 1 proved"),
-    (json.dumps({**LINE, "t_end": 0.25}), 1, "a/1: false: the answer is horizon"),
-    (json.dumps({**LINE, "kind": "flow"}), 1, "a/1: false: the path has 1 steps, or goes on"),
-    ("[" * 100_000, 2, "unreadable after 0 claims"),
-    (json.dumps(LINE) + "\n{}", 2, "unreadable after 1 claims"),
-    ("{", 2, "unreadable after 0 claims"),
-    (json.dumps({**LINE, "rule": "a\u2028b"}, ensure_ascii=False), 0, "1 of 1 proved"),
-    (json.dumps(LINE)[:-1] + ', "id": "a/2"}', 2, "a key comes twice"),
-    (json.dumps({**LINE, "scene": {"table": 0}}).replace("0}", f"{'9' * 5000}}}"), 2, "unreadable after 0"),
-    (json.dumps({**LINE, "collisions": 999_999, "expect": [{"outcome": "collision"}]}), 2, "kind or"),
-    (json.dumps(REFUSED), 0, "1 of 1 proved"),
-    (json.dumps({**LINE, "kind": "jump"}), 2, "kind or collisions are none"),
-    (json.dumps({**LINE, "expect": [{"outcome": "collision", "steps": [5]}]}), 2, "dt must be given"),
-]
-
-
-ROWS = [
-    *[(["--answers"], json.dumps(data), code, word) for data, code, word in ANSWERS],
-    *[([], text, code, word) for text, code, word in FILES],
-]
-
-
-@pytest.mark.parametrize(("options", "text", "code", "word"), ROWS, ids=range(len(ROWS)))
-def test_a_file_is_judged(
-    options: list[str], text: str, code: int, word: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "lines.jsonl"
-    path.write_text(text, "utf-8")
-    assert verify.main([*options, str(path)]) == code
-    assert word in "".join(capsys.readouterr())
-
-
-@pytest.mark.parametrize(
-    ("options", "code", "word"),
-    [
-        ([CORPUS / "bend-nu-rate-fourier.jsonl"], 0, " proved"),
-        ([], 2, "give files"),
-        (["nowhere.jsonl"], 2, "nowhere"),
-    ],
-)
-def test_the_file_runs_alone(options: list[object], code: int, word: str) -> None:
-    """As users run it, and with nothing of this project on its path."""
-    command = [sys.executable, "-I", verify.__file__, *map(str, options)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100)
-    assert done.returncode == code
-    assert word in done.stdout + done.stderr
-
-
 SOURCE = Path(verify.__file__).read_text("utf-8")
 STEM: dict[str, Any] = {"table": "stem", "w": 1.0, "h": 1.0}
 MUSHROOM: dict[str, Any] = {"table": "mushroom", "r": 1.0, "w": 0.5, "h": 1.0}

@@ -267,7 +267,8 @@ def test_a_right_trajectory_is_proved_and_a_false_step_is_drawn(tmp_path, comman
     arguments = ("verify", path, "--scene", "moving-cap", "--picture", picture)
     for words in (arguments, ("verify", whole)):
         code, out, _ = command_line(*words)
-        assert (code, out.splitlines()[-1]) == (0, "4 of 4 proved")
+        assert code == 0
+        assert out.splitlines()[-1] == "4 of 4 agree within 9.01e+06 backward ulps, 0 false, 0 open"
     assert not picture.exists()
     path.write_text(as_csv([*states[:2], {**states[2], "x": states[2]["x"] + 0.01}]))
     code, out, _ = command_line(*arguments)
@@ -276,6 +277,19 @@ def test_a_right_trajectory_is_proved_and_a_false_step_is_drawn(tmp_path, comman
         f"step 2: x = {states[2]['x'] + 0.01:.10g}, must be {states[2]['x']:.10g}: off by 0.01"
         in picture.read_text()
     )
+    lines_of_json = tmp_path / "steps.jsonl"
+    rows = [{"scene": scene, "state": states[0]}, *states[1:]]
+    lines_of_json.write_text("\n".join(map(json.dumps, rows)))
+    for options, expected in ((("--all", "--within", "1e6"), 0), (("--within", "0"), 1)):
+        code, out, _ = command_line("verify", lines_of_json, *options)
+        assert (code, " agree within " in out) == (expected, True)
+
+
+def test_a_wall_that_is_missing_from_a_table_is_named(tmp_path, command_line):
+    path = tmp_path / "steps.csv"
+    path.write_text("t,x,y,vx,vy\n0,0.1,0.2,3,4\n1,0,0,0,1\n")
+    code, out, err = command_line("verify", path, "--scene", "moving-cap")
+    assert (code, out, "column 'wall' is missing" in err) == (2, "", True)
 
 
 @pytest.mark.parametrize(
@@ -295,7 +309,7 @@ def test_the_picture_of_a_false_step_shows_what_is_off(name, change, words):
     figures = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(check_page.plots, "svg", figures.append)
-        check_page.draw_step(scenes.load("moving-cap"), START, truth, given, 7)
+        check_page.draw_step(scenes.load("moving-cap"), START, truth, given, "step 7")
     [figure] = figures
     title = figure.get_suptitle()
     assert title.startswith(f"step 7: {name} = ")

@@ -190,7 +190,7 @@ REFUSED: list[Any] = [
     ("ask fresh/999 --seed 1", ["ID = 'fresh/999'"]),
     ("ask moving-cap/3 -- ./no-such-stepper", ["no-such-stepper"]),
     (f"ask moving-cap/3 -- {shlex.join(command('other-protocol'))}", ["does not speak protocol 1"]),
-    ("verify none.json", ["'none.json': No such file"]),
+    ("verify none.json", ["none.json: No such file"]),
     # files that cannot be, or of no such kind
     ("draw moving-cap --out picture.jpeg", ["picture.jpeg", ".svg"]),
     ("draw moving-cap --out nowhere/picture.svg", ["nowhere/picture.svg", "No such"]),

@@ -283,15 +283,15 @@ ILL_FORMED = [
     ({**CAP, "r": "1.0"}, "r = '1.0': must be a number or a law"),
     ({**CAP, "r": None}, "r = None: must be a number or a law"),
     ({**CAP, "r": True}, "r = True: must be a number or a law"),
-    ({**CAP, "r": [1.0]}, "r = an object of type list: must be a number or a law"),
+    ({**CAP, "r": [1.0]}, "r = [1.0]: must be a number or a law"),
     ({**CAP, "name": 3}, "name = 3: Expected `str`"),
     ({**CAP, "r": {}}, "r has no `kind`, must be one of fourier, bang-bang"),
     ({**CAP, "r": {"kind": "sawtooth"}}, "r.kind = 'sawtooth', must be one of fourier, bang-bang"),
     ({**CAP, "r": {**FOURIER, "phase": 0.0}}, "unknown field `phase`"),
     ({**CAP, "r": {**FOURIER, "cos": 0.5}}, "r.cos = 0.5: Expected `array`"),
     ({**CAP, "r": {**FOURIER, "cos": [0.1, "x"]}}, "r.cos[1] = 'x': Expected `float`"),
-    ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0]]}}, "r.knots[1] = an object of type list: Exp"),
-    ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0, 2.0]]}}, "r.knots[0] = an object of type list: Exp"),
+    ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0]]}}, "r.knots[1] = [1.0]: Exp"),
+    ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0, 2.0]]}}, "r.knots[0] = [0.0, 1.0, 2.0]: Exp"),
 ]
 # What no schema says.
 IMPOSSIBLE = [

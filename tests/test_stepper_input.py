@@ -137,6 +137,30 @@ def test_numbers_of_other_kinds_are_the_floats_they_stand_for(kind):
     assert runs[0].sha256() == runs[1].sha256()
 
 
+BESIDE = 0.25
+ASKED = [
+    (scene, State(0.0, x, y, 0.3, -0.7, wall))
+    for scene in (CAP, STEM, MUSHROOM)
+    for x in (0.0, BESIDE, -0.45, 0.6, -0.75, 0.99)
+    for y in (0.0, BESIDE, -BESIDE, 2.0**-60, -(2.0**-60), 0.9, -0.97, 1.02, -1.02)
+    for wall in (None, *scene.walls)
+]
+
+
+def test_a_state_beyond_a_wall_is_refused_as_the_reference_does():
+    """Of one on a wall to within rounding either may be said; that is asked elsewhere."""
+    kinds = {"beyond": 0, "both": 0}
+    for scene, state in ASKED:
+        proved = reference.next_collision(scene, state, 1.0)
+        found = fast.next_collision(scene, state, 1.0)
+        refused = [isinstance(one, Rejected) for one in (proved, found)]
+        assert refused[0] == refused[1], (scene, state, proved, found)
+        kinds["both"] += refused[0]
+        kinds["beyond"] += refused[0] and "beyond wall" in found.reason
+    assert kinds["beyond"] > 20
+    assert len(ASKED) - kinds["both"] > 50
+
+
 RESTING = State(0.0, 0.0, 0.5, 0.0, 0.0)
 
 

@@ -18,6 +18,7 @@ from scipy.special import ndtr
 from support.depth import deep_among, deep_but
 
 from scene import BangBang, Fourier, Mushroom, load
+from scene.precision import decimals
 from scene.transforms import scaled
 from theory import (
     Cycle,
@@ -45,6 +46,7 @@ from theory import (
     volumes_at,
 )
 from theory.branches import Branch, at
+from theory.chebyshev import Grid, compressed, convolve
 from theory.volumes import delta_slope
 
 
@@ -528,3 +530,30 @@ def test_the_uncaptured_of_a_loop_that_is_its_own_reverse_are_not_lost(n: int) -
     gained = p[0] - np.trapezoid(np.exp(-s) * p, s)
     assert loss_probability(found, n) == pytest.approx(gained, rel=3e-4)
     assert float(sums.cdf(0.0)) > gained + 0.4 * found.p_nc**n  # a distribution function has them
+
+
+@pytest.mark.parametrize("ctx", [fp, decimals(30)], ids=["floats", "30 digits"])
+def test_compressed_masses_keep_the_means_of_polynomials(ctx) -> None:
+    """Of masses that differ by rounding one is left; of few none is taken away."""
+    grid, many = Grid(ctx, 16), [ctx.mpf(k) for k in range(1, 41)]
+    total = ctx.fsum(many)
+    one = 1 + 15 * ctx.eps
+    for masses in ([(w, ctx.mpf(2)) for w in many], [(w, 2 * one if w == 7 else ctx.mpf(2)) for w in many]):
+        assert compressed(grid, masses) == [(total, 2)]
+    spread = [(w, ctx.cos(w)) for w in many]
+    for low, masses in ((1, spread), (1 + 1e-6, [(w, 1 + (1 + s) * ctx.mpf(1e-6)) for w, s in spread])):
+        few = compressed(grid, masses)
+        assert len(few) == 17, low
+        for degree in range(4):
+            mine, its = (ctx.fsum(w * s**degree for w, s in these) for these in (few, masses))
+            assert abs(mine - its) <= 1e4 * ctx.eps * total
+    assert compressed(grid, spread[:17]) == spread[:17]
+
+
+def test_a_sum_of_two_has_the_means_of_both() -> None:
+    grid = Grid(fp, 16)
+    first, second = ([(1 / 30, math.sin(a * k)) for k in range(30)] for a in (1.0, 2.3))
+    found = convolve(grid, first, second)
+    for degree in (1, 2, 3):
+        direct = math.fsum(v * w * (r + s) ** degree for v, r in first for w, s in second)
+        assert math.fsum(w * s**degree for w, s in found) == pytest.approx(direct, abs=1e-12)

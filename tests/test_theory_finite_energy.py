@@ -381,3 +381,20 @@ def test_a_wrong_exponent_shows_in_the_residuals() -> None:
     law = fit_power(energies, 1.9 * energies**0.25, 0.01 * energies**0.25)  # as sec. 4.1 prints it
     assert abs(law.exponent + 0.25) > 10 * law.exponent_error
     assert extrapolate(energies, 0.1 + energies**-0.25, np.full(6, 1e-4)).chi_square > 1000
+
+
+@pytest.mark.parametrize("kept", [{0: 1.0}, {1: 1.0}, {0: 1.0, 2: 3.0}])
+def test_blocks_are_of_twice_the_memory_that_diffusion_has(kept: dict[int, float]) -> None:
+    """Where nothing moves a particle's path in a cycle is its speed, and the memory that of its kicks."""
+    diffusion = np.zeros((N_TIMES, len(MEMORIES)))
+    for k, weight in kept.items():
+        diffusion[:, k] = 1e-3 * weight
+    none, zero = np.zeros((N_TIMES, len(SPEEDS))), np.zeros(N_TIMES)
+    rates_there = rates.RatesAt(diffusion, none, none, none)
+    crossing, hardly = np.full(N_TIMES, np.pi), np.full(N_TIMES, 1e-9)  # kicks have the sign of the shear
+    times = (0.0, 1 / N_TIMES)
+    cycle = rates.CycleCoefficients(*times, zero, zero, zero > 0, hardly, crossing, rates_there)
+    fields = Fields(cycle, 1e6)
+    memory = sum(weight * MEMORIES[k] for k, weight in kept.items()) / sum(kept.values())
+    assert fields.n_blocks == pytest.approx(2e6**0.5 / (2 * memory))
+    assert (fields.depleted, fields.turned, fields.forgotten) == pytest.approx((0, 0, 0), abs=1e-6)

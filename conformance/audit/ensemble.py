@@ -173,12 +173,20 @@ def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Theory) -> Chec
     found = [(one.value - two.value, float(np.hypot(one.error, two.error))) for one, two in pairs]
     return close(
         "reversal identity: share of exp(-s) below s, less that above -s of the reversed cycle",
-        max(found, key=lambda pair: abs(pair[0]) / pair[1]),
+        max(found, key=_in_errors),
         0.0,
         band=2 * shape_band(theirs),
         scale=0.3,
         against=("the same direction twice", 0.3),
     )
+
+
+def _in_errors(difference: tuple[float, float]) -> float:
+    """Return a difference in its standard errors; that of very few particles may have no error."""
+    size, error = abs(difference[0]), difference[1]
+    if error == 0:
+        return math.inf if size else 0.0
+    return size / error
 
 
 def _records(given: GivenEnsemble) -> Iterator[Check]:

@@ -161,7 +161,7 @@ def paths(result: Result, vector: vectors.Vector) -> bytes:
 
 @rc_context(plots.STYLE)
 def draw_step(
-    scene: Scene, state: State, truth: Collision | Horizon, given: Mapping[str, Any], number: int
+    scene: Scene, state: State, truth: Collision | Horizon, given: Mapping[str, Any], place: str
 ) -> bytes:
     """Draw one step as SVG: where it leads, and where it was said to; the whole table, and close up.
 
@@ -173,7 +173,7 @@ def draw_step(
         state: where it begins.
         truth: its certified end.
         given: its end as it was given; fields may be missing.
-        number: of the step, from 1.
+        place: of the step, such as step 1.
     """
     size = float(np.ptp(np.hstack(draw.walls(scene, truth.t)), axis=1).max())
     certified = {**_fields(truth), "t": truth.t}
@@ -187,7 +187,7 @@ def draw_step(
     figure.axes[1].locator_params(nbins=4)
     speed = math.hypot(truth.vx, truth.vy)
     scales = {"t": abs(truth.t), "x": size, "y": size, "vx": speed, "vy": speed}
-    figure.suptitle(f"step {number}: {_worst_field(certified, given, scales, getattr(truth, 'wall', None))}")
+    figure.suptitle(f"{place}: {_worst_field(certified, given, scales, getattr(truth, 'wall', None))}")
     return plots.svg(figure)
 
 

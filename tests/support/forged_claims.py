@@ -3,8 +3,8 @@
 Each forgery is a function of a stream of random numbers and a line that holds. It returns a line that is
 false, or None where it cannot be sure of that; its docstring says why the line is false. One reason serves
 most: a question has one answer, so what contradicts a true claim is false. Later roots, wrong physics,
-questions that must be refused, exchanged ends and further answers are forged elsewhere: by faulty references
-under attack, and by weaker verifiers.
+questions that must be refused and exchanged ends are forged elsewhere: by faulty references under attack, and
+by weaker verifiers.
 """
 
 import json
@@ -162,6 +162,102 @@ def spoil(random: Random, line: Line) -> Line:
     return forged
 
 
+UNKNOWN = ("t", "outcome", "captured", "stays", "Wall", "t_end", "dt ", "note", "reason ", "")
+
+
+def add_field(where: str, random: Random, line: Line) -> Line:
+    """Add a field that a line, an answer or a step does not have: a reader may take it for proved."""
+    forged = plain(line)
+    answer = forged["expect"][0]
+    holder = {"line": forged, "answer": answer, "step": random.choice(answer["steps"])}[where]
+    free = [name for name in UNKNOWN if name not in verify.FORMS[where]]
+    holder[random.choice(free)] = random.choice((None, 0, ["7", "8"], "horizon", True))
+    return forged
+
+
+def negate(names: tuple[str, ...], random: Random, line: Line) -> Line | None:
+    """Give numbers of a step the other sign: as before the bounce, or on the other side of the table."""
+    forged = plain(line)
+    step = random.choice(forged["expect"][0]["steps"])
+    true = plain(step)
+    for name in names:
+        low, high = map(Decimal, step[name])
+        step[name] = [str(-high), str(-low)]
+    return forged if contradicts(step, true) else None
+
+
+def exchange(one: str, other: str, random: Random, line: Line) -> Line | None:
+    """Exchange two numbers of a step."""
+    forged = plain(line)
+    step = random.choice(forged["expect"][0]["steps"])
+    true = plain(step)
+    step[one], step[other] = step[other], step[one]
+    return forged if contradicts(step, true) else None
+
+
+def scale_speed(random: Random, line: Line) -> Line | None:
+    """Multiply vx and vy by one factor."""
+    forged = plain(line)
+    step = random.choice(forged["expect"][0]["steps"])
+    true, factor = plain(step), 1 + Decimal(random.choice((-3, 1, 2))).scaleb(-random.randint(1, 15))
+    for name in ("vx", "vy"):
+        step[name] = sorted((str(DECIMAL.multiply(Decimal(end), factor)) for end in step[name]), key=Decimal)
+    return forged if contradicts(step, true) else None
+
+
+def hide_wall(random: Random, line: Line) -> Line:
+    """Leave out the wall of a hit: the step ends at the horizon then."""
+    forged = plain(line)
+    step = random.choice([step for step in forged["expect"][0]["steps"] if step.get("wall")])
+    del step["wall"]
+    return forged
+
+
+def start_elsewhere(random: Random, line: Line) -> Line | None:
+    """Move x or y of the start: where x(dt) = x + vx dt is the same, dt is not, and there is one dt."""
+    forged = plain(line)
+    name = random.choice(("x", "y"))
+    moved = line["state"][name] * (1 + random.choice((-1, 1)) * 2.0 ** -random.randint(8, 40))
+    forged["state"][name] = moved
+    return forged if moved != line["state"][name] and line["state"].get("wall") is None else None
+
+
+def resize(random: Random, line: Line) -> Line | None:
+    """Change the radius of a cap at rest: the place of a hit of its arc does not lie on the new arc."""
+    scene, wall = line["scene"], line["expect"][0]["steps"][0].get("wall")
+    is_left = line["state"].get("wall") == "arc"  # its residual would move with the radius
+    if not isinstance(scene.get("r"), float) or wall != "arc" or is_left:
+        return None
+    return {**line, "scene": {**scene, "r": scene["r"] * (1 + 2.0 ** -random.randint(8, 40))}}
+
+
+def repeat_step(random: Random, line: Line) -> Line:
+    """Repeat the last step of a path: no wall is met twice at one place and time with one velocity."""
+    forged = plain(line)
+    steps = forged["expect"][0]["steps"]
+    steps.append(steps[-1])
+    forged["collisions"] = max(forged["collisions"], len(steps))
+    return forged
+
+
+def answer_twice(_: Random, line: Line) -> Line:
+    """Give the right answer as a further one, too: only "undecided" and "rejected" are further answers."""
+    return {**line, "expect": [*line["expect"], line["expect"][0]]}
+
+
+def refuse(_: Random, line: Line) -> Line:
+    """Call a question bad that is answered."""
+    return {**line, "expect": [{"outcome": "rejected"}]}
+
+
+def cut_short(random: Random, line: Line) -> Line | None:
+    """Leave out the end of a path of which all collisions were found, and still ask for all of them."""
+    forged = plain(line)
+    answer = forged["expect"][0]
+    del answer["steps"][random.randrange(1, len(answer["steps"])) :]
+    return forged if answer["outcome"] == "collision" else None
+
+
 KINDS: dict[str, tuple[str, Forge]] = {
     "a number moved by widths": ("answered", partial(move, 0)),
     "a number moved by some 1e-15": ("answered", partial(move, 8)),
@@ -181,6 +277,21 @@ KINDS: dict[str, tuple[str, Forge]] = {
     "a capture interval added": ("flow", partial(change_stays, "add")),
     "steps of a flow miscounted": ("flow", miscount),
     "a field spoiled": ("answered", spoil),
+    "a field added to a line": ("answered", partial(add_field, "line")),
+    "a field added to an answer": ("answered", partial(add_field, "answer")),
+    "a field added to a step": ("answered", partial(add_field, "step")),
+    "a velocity not reflected": ("hit", partial(negate, ("vx", "vy"))),
+    "a place mirrored": ("answered", partial(negate, ("x", "vx"))),
+    "x and y exchanged": ("answered", partial(exchange, "x", "y")),
+    "vx and vy exchanged": ("answered", partial(exchange, "vx", "vy")),
+    "a speed multiplied": ("answered", scale_speed),
+    "a wall hidden": ("hit", hide_wall),
+    "another start": ("hit", start_elsewhere),
+    "another radius": ("hit", resize),
+    "a step repeated": ("trajectory", repeat_step),
+    "an answer twice": ("answered", answer_twice),
+    "an answer called bad": ("hit", refuse),
+    "a path cut short": ("trajectory", cut_short),
 }
 POOLS: dict[str, Callable[[Line, Line], object]] = {
     "answered": lambda line, answer: answer.get("steps"),

@@ -6,7 +6,10 @@ import pytest
 from support.starts_by_hand import CAP, MUSHROOM, STARTS, STEM, bang_bang, fourier, state
 
 import reference
-from scene import Rejected, State, Undecided, Undefined, from_data
+from reference import arithmetic
+from reference.arithmetic import Exhausted, Interval
+from reference.course import Course
+from scene import Rejected, State, Undecided, Undefined, Wall, from_data
 
 MIRRORED = {"left": "right", "right": "left"}
 
@@ -88,3 +91,28 @@ def test_what_few_digits_leave_open_is_undecided(
     assert path.outcome.reason.startswith(reason)
     assert path.outcome.reason.endswith(f"({working} digits)")
     assert len(reference.trajectory(table, given, n + 1, t_end, working=60).outcomes) == n + 1
+
+
+def test_work_that_ends_anywhere_leaves_the_question_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also within the proof that the arc is never met, for which the table's laws are followed for a period."""
+    scene = from_data({**CAP, "r": fourier(cos=[0.125, 0.0625])})
+    start = State(0.0, 0.125, 0.25, 0.0001, 0.0001)
+    ends_within = set()
+    honest = Course._is_never_met
+
+    def watched(self: Course, wall: Wall, s: Interval) -> bool:
+        try:
+            return honest(self, wall, s)
+        except Exhausted:
+            ends_within.add(self.arithmetic.work.spent)
+            raise
+
+    monkeypatch.setattr(Course, "_is_never_met", watched)
+    for limit in range(0, 250, 10):
+        monkeypatch.setattr(arithmetic, "MAX_WORK", float(limit))
+        outcome = reference.next_collision(scene, start, 1e4, digits=10)
+        assert isinstance(outcome, Undecided)
+        assert outcome.reason.startswith(f"more than {limit} evaluations of the laws")
+    assert len(ends_within) > 5
+    monkeypatch.undo()
+    assert isinstance(reference.next_collision(scene, start, 1e4, digits=10), reference.Collision)

@@ -94,7 +94,7 @@ def test_what_few_digits_leave_open_is_undecided(
 
 
 def test_work_that_ends_anywhere_leaves_the_question_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also within the proof that the arc is never met, for which the table's laws are followed for a period."""
+    """Also within the proof that the arc is never met."""
     scene = from_data({**CAP, "r": fourier(cos=[0.125, 0.0625])})
     start = State(0.0, 0.125, 0.25, 0.0001, 0.0001)
     ends_within = set()

@@ -1409,12 +1409,13 @@ def require_known(record: Any) -> None:
 
 
 def require_narrow(record: Any, digits: int) -> None:
-    """Require that each enclosure of the first answer is at most 10^-digits of its larger end wide.
+    """Require that each enclosure of the proved answer is at most 10^-digits of its larger end wide.
 
     Raises:
         Unproved: an enclosure is wider.
     """
-    for place, step in enumerate(record["expect"][0].get("steps", []), 1):
+    answer, _ = claim_of(record)
+    for place, step in enumerate(answer.get("steps", []), 1):
         for name in NUMBERS:
             low, high = map(Fraction, step[name])
             require(

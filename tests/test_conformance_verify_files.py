@@ -194,6 +194,16 @@ def test_the_width_is_that_of_the_larger_end():
     assert verify.verify_line(record, 1).status == "not proved"
 
 
+def test_the_answer_that_must_be_narrow_is_the_proved_one():
+    """A refusal may stand before it."""
+    late = {**LINE, "state": {**DOWN, "t": 2.0**30}, "t_end": 2.0**30 + 9}
+    for first, second in ((0, 1), (1, 0)):
+        answers = [WIDE["expect"][0], {"outcome": "rejected"}]
+        record = {**late, "expect": [answers[first], answers[second]]}
+        assert verify.verify_line(record).status == "proved"
+        assert verify.verify_line(record, 1).status == "not proved"
+
+
 OPTIONS = {
     "none": ([], "required: FILE"),
     "unknown": (["--answer", "a"], "--answer"),

@@ -28,13 +28,13 @@ There are three verdicts:
 - "false": something that is proved contradicts the claim.
 - "not proved": the claim is open at each precision up to 4,096 bits, or a search took too long.
 
-Two kinds of claims stay open: two walls met together at an irrational time, and exact zeros of a
-Fourier law at a phase that is not a whole number of quarter turns.
+Two kinds of claims stay open. Two walls may be met together at an irrational time. Or f may be 0
+exactly while the phase of a Fourier law is not a whole number of quarter turns.
 
 The verifier does not judge the fields `allowance`, `condition` and `level`, the texts that describe
 a line, and the reason of a rejection. It refuses the scenes that `scene.from_data` refuses, with one
-exception: if laws of both kinds meet in one condition, `scene.from_data` also refuses scenes that
-touch or nearly touch the bound.
+exception. A condition may combine a Fourier law and a bang-bang law. There `scene.from_data` also
+refuses a scene that touches the bound, or nearly does.
 """
 
 import argparse
@@ -60,12 +60,14 @@ PRECISIONS = (128, 256, 512, 1024, 2048, 4096)  # bits, tried in turn
 WORK = 480_000  # units of work for a line, of some 25 microseconds each: about 12 seconds in all
 SHARE = Fraction(61, 128)  # where a stretch is cut: not in the middle, where a root may well lie
 NEAR = Fraction(1, 2**20)  # how far from its wall a state may lie, as a share of the wall's size
-LATE, LARGE = 2**30, Fraction(10**100)  # |t| in periods, or a number, from which one may refuse
-MOST_WAVES, MOST_KNOTS = 16, 256  # of a law
+LATE = 2**30  # periods: a state at |t| as late as this may be refused
+LARGE = Fraction(10**100)  # a state with a number of this size may be refused
+MOST_WAVES = 16  # of a Fourier law
+MOST_KNOTS = 256  # of a bang-bang law
 UNIT = Fraction(1, 2**53)  # unit roundoff of binary64: half a unit in the last place, relative
 BEYOND = Fraction(3, 2**12)  # how far past its end a search goes, as a share of its length
 WITHIN = 1e-9 * 2.0**53  # --answers: backward error, in ulps, beyond which a step is false
-TICKS = 2  # --answers: last places by which the time of an answer may be off, however short dt is
+TICKS = 2  # --answers: last places by which t may be off where an answer does not give dt
 FAR = 1e300  # --answers: the horizon of a path that has none
 PULSE = 5  # --answers: seconds between two lines of progress
 LARGEST = sys.float_info.max
@@ -114,8 +116,8 @@ def require(holds: object, failure: Exception) -> None:
 class Interval:
     """All real numbers from lo 2^exp to hi 2^exp.
 
-    The result of an operation holds the result for any numbers of its operands. Operations round
-    outward to `bits` binary digits. `low`, `high` and `number` keep all digits.
+    An operation returns an interval that holds the result for all numbers of its operands. It
+    rounds outward to `bits` binary digits. `low`, `high` and `number` keep all digits.
     """
 
     __slots__ = ("bits", "exp", "hi", "lo")
@@ -268,13 +270,16 @@ def pi(bits: int) -> Interval:
 
 
 def cos_sin(turns: Interval) -> tuple[Interval, Interval]:
-    """Enclose cosine and sine of so many whole turns, for a narrow interval.
+    """Enclose cosine and sine of a phase, which is given in turns and known narrowly.
 
     The nearest quarter turn is taken out. The angle left is m 2^-scale for an integer m, and up to
-    `radius` units more or less; the slopes of both functions are at most 1. |m| 2^-scale < 1, so
-    each of Taylor's terms is at most the term before. They are rounded down to integers, twice
-    each: where term k - 1 is e units too small, term k is at most (e + 1) / k + 1 too small: less
-    than 4, from e = 0 on. The series alternates, so what is left out counts as one more term.
+    `radius` units more or less. The slopes of both functions are at most 1. |m| 2^-scale < 1, so
+    each of Taylor's terms is at most the term before. Each term is rounded down twice. If term
+    k - 1 is e units too small, term k is at most (e + 1) / k + 1 units too small. From e = 0 on
+    that is always less than 4. The series alternates, so the rest counts as one more term.
+
+    Raises:
+        Unproved: the phase is known to no better than a radian.
     """
     scale, bits = turns.bits + 8, turns.bits
     quarter = floor_of(floor_of(turns.lo + turns.hi, turns.exp + 2) + 1, -1)
@@ -344,7 +349,7 @@ class Law(NamedTuple):
         waves: for k = 1, 2, ... the factors of cos and sin of k times the phase.
         legs: of a bang-bang law, two from each knot to the next, in the order of time.
         ends: a lower and an upper bound of its values, at all times.
-        is_tight: whether it attains both.
+        is_tight: whether it attains both bounds.
     """
 
     mean: Fraction
@@ -358,8 +363,8 @@ class Scene(NamedTuple):
     """A table with its laws by name; w = nu r where nu is given.
 
     What moves has one period: 2 pi / omega, or `period`, exactly. Both are None when nothing moves.
-    `work` holds one number: the units of work that are left for the line. `is_loose` tells that
-    more was given than `without_loose` keeps, so that one may refuse the scene.
+    `work` holds one number: the units of work that are left for the line. `is_loose` tells that the
+    scene has a field that one may ignore or refuse (`without_loose`).
     """
 
     table: str
@@ -416,9 +421,9 @@ class Clock:
     def waves(self, s: Interval, n: int) -> Iterator[list[Interval]]:
         """Enclose cosine and sine of k times the phase over a stretch, for k = 1 to n.
 
-        A wave turns at quarters of a turn only: cosine is 1 at quarter q if q % 4 = 0 and -1 if 2,
-        sine is 1 if 1 and -1 if 3. Between, it lies between its values at the ends. Any four
-        quarters in a row hold all of these.
+        The extremes lie at whole quarters of a turn. At quarter q, cosine is 1 if q % 4 = 0 and -1
+        if q % 4 = 2. Sine is 1 if q % 4 = 1 and -1 if q % 4 = 3. A stretch without an extreme has
+        its largest and its least value at its ends. Any four quarters in a row hold all extremes.
         """
         begin, end = self.offset + self.pace * s.low, self.offset + self.pace * s.high
         one, at_begin, at_end = number(1, self.bits), self.circle(begin, n), self.circle(end, n)
@@ -447,9 +452,9 @@ def wave_jet(
 def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
     """Enclose a law and its derivatives over a stretch of time.
 
-    Rationals tell which legs of a bang-bang law a stretch touches: it is enclosed on each, and the
-    parts are joined. f'' is enclosed but at knots and between two legs, where it jumps: there a
-    stretch that is a point has the value just after it.
+    Rationals tell which legs of a bang-bang law a stretch touches. The law is enclosed on each of
+    these legs, and the parts are joined. f'' jumps where one leg ends and the next begins. A
+    stretch that begins there has the value just after the jump.
     """
     exact = partial(number, bits=clock.bits)
     # With more digits only cosines cost much more.
@@ -563,9 +568,9 @@ class State(NamedTuple):
 class Flight:
     """A particle in flight: where walls are on its way, and what it meets first.
 
-    Times count from the clock's instant. The line at time 0 is enclosed by a box. The flight begins
-    at some time in `begin`, which is exactly 0 for a state that is given. The true state is one of
-    those in the box, and what is proved about walls that are met holds for every state in the box.
+    Times count from the clock's instant. The place at time 0 and the velocity lie in a box. The
+    flight begins at some time in `begin`, which is exactly 0 for a state that is given. The true
+    state lies in the box, and what is proved about walls that are met holds for the whole box.
 
     The wall being left is an exception. There f is not 0 at the begin but c, the residual, because
     the state is rounded. f - c stands for f, and f - c = 0 at the begin holds for the true state
@@ -679,9 +684,9 @@ class Flight:
         return is_positive or all(self.is_never_met(wall, end, s) for end in (s.high, s.low))
 
     def holds_begin(self, wall: str, s: Interval) -> bool:
-        """Tell whether a stretch of the wall being left does not lie after all of `begin`.
+        """Tell whether f of the wall being left may vanish on a stretch because the flight begins.
 
-        There f may vanish because the flight begins, and no root is accepted.
+        It may, unless the stretch lies after all of `begin`. There no root is accepted.
         """
         return wall == self.wall and not is_below(self.begin, s.low)
 
@@ -693,8 +698,8 @@ class Flight:
         particle at rest that is not met within one period is never met.
 
         The particle at rest "begins" at -1, before the search: no stretch holds its begin, so f > 0
-        is asked from time 0 on. This is asked for stretches s longer than a period only. The search
-        is no longer, so it does not ask this again.
+        is asked from time 0 on. This is tried only if s is longer than a period. The search for the
+        particle at rest covers one period, so it never comes here again.
         """
         (x, y, vx, vy), zero, turn = self.line, self.clock.zero, self.clock.turn
         if turn is None or not is_below(turn, s.high - s.low):
@@ -836,10 +841,10 @@ class Flight:
         their hit only, and then the search ends before that.
 
         The last search goes a little past the limit, so that a root at the limit lies inside the
-        stretch. There are two kinds of limit. The horizon is enclosed by self.end exactly. A
-        crossing of y = 0 lies before that, so its upper end differs from self.end; a wall that is
-        met there counts as a hit, and `earliest` decides. A wall that is met at the horizon exactly
-        is not met before it: its enclosure overlaps the horizon and holds one root only.
+        stretch. The limit is the horizon, which is self.end exactly, or a crossing of y = 0, which
+        lies before that. A root that overlaps a crossing counts as a hit, and `earliest` decides.
+        A root that overlaps the horizon counts, too, unless f = 0 at the horizon exactly. Then that
+        is the one root in its enclosure, and the wall is not met before the horizon.
         """
         for since, stop in self.stretches(start, limit.high):
             hits, queue = [], list(walls)
@@ -868,7 +873,7 @@ class Flight:
 
         The first is about as long as a crossing of the table or a period, whichever is less. Each
         next one is four times as long. The lengths affect the cost only, not what is proved. They
-        are others at each precision: where a wall is met at the end of a stretch, it is open.
+        differ from precision to precision: a wall that is met just where a stretch ends is open.
 
         A particle at rest gives no length, nor does a table at rest. If both rest, one stretch
         reaches `last`, and f is constant on it.
@@ -1095,7 +1100,7 @@ def read_scene(data: Any, work: list[int]) -> Scene:
     table = data.get("table")
     require(isinstance(table, str) and table in wanted, Refused("the scene has no known table"))
     given, is_loose = without_loose(data, ("table", "name", "notes", *LAWS[table]))
-    # Texts have no effect: one that may not stand there is ignored, or refused.
+    # Texts have no effect. One may ignore a text that is not allowed, or refuse it.
     texts = [given.pop(name, "") for name in ("name", "notes")]
     is_loose |= not all(isinstance(text, str) and not HIDDEN.search(text) for text in texts)
     read = {} if table == "cap" else {"slope": read_law(0)}
@@ -1353,8 +1358,8 @@ def require_inside(name: str, claim: Any, found: Interval) -> None:
     )
 
 
-# The fields of a line, of an answer in it and of a step, with the types that JSON has for them. A line
-# that has a field more, at any depth, is not read: somebody may take it for a part of what is proved.
+# The fields of a line, of an answer and of a step, with their types in JSON. A line with any other
+# field, at any depth, is not read: people may take that field for proved.
 NUMBER, TEXT = (int, float), (str,)
 FORMS: dict[str, dict[str, tuple[type, ...]]] = {
     "line": {
@@ -1481,10 +1486,10 @@ def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
 
 
 def claim_of(record: Any) -> tuple[Any, list[Any]]:
-    """Return the answer of a line that is to be proved, which does more than refuse if one does.
+    """Choose the answer of a line that is to be proved: the first that is not "rejected", if any.
 
     Returns:
-        It, and the further answers.
+        The answer, and the others.
     """
     answers = take(record, "expect", list) or [None]
     outcomes = [take(answer, "outcome", str) for answer in answers]
@@ -1496,7 +1501,7 @@ def require_listed(others: Sequence[Any], permitted: Sequence[Any]) -> None:
     """Require that a line lists each further answer that the rules permit, once, and no other.
 
     Raises:
-        Contradicted: it does not.
+        Contradicted: an answer is missing, is listed twice, or is not permitted.
     """
     require(
         all(other in permitted for other in others),
@@ -1551,7 +1556,7 @@ def thin(path: Sequence[Step], claimed: Any) -> Iterator[Step]:
     stays = list(find_stays([mark(step) for step in path]))
     kept = sorted({place for stay in stays for place in stay} | {len(path) - 1})
     listed = {place: at for at, place in enumerate(kept)}
-    # Of 1.0 and true, which equal 1 and are no places, the text is another.
+    # 1.0 and true equal 1, but they are no indices. Their texts differ.
     places = [[listed[place] for place in stay] for stay in stays]
     require(
         claimed == places and str(claimed) == str(places),
@@ -1970,7 +1975,7 @@ def measure_errors(scene: Scene, state: State, t_end: Fraction, answer: Any) -> 
 
 
 def ratio(error: Fraction, size: Fraction) -> float:
-    """Return an error in units, at most LARGE. Where nothing moves a number only 0 is no error."""
+    """Return an error in units, at most LARGE in size. If the unit is 0, any error is LARGE."""
     if size == 0:
         return float(LARGE) * ((error > 0) - (error < 0))
     return float(max(-LARGE, min(error / size, LARGE)))
@@ -1995,9 +2000,10 @@ def require_not_close(scene: Scene, state: State, t_end: Fraction, wall: Any) ->
 class Tally:
     """The errors of one number over a path: the worst, the mean, and the mean with signs.
 
-    A step that is wrong by as much in the same direction each time is a bias. It adds up over a
-    path, while errors of both signs cancel. `outward` takes an error as positive where the number
-    is too large in size: a factor of all velocities shows there, and a constant shows in `signed`.
+    A bias is an error that has the same direction at each step. It adds up over a path, while
+    errors of both signs cancel. There are two means. In `signed` errors count as they are: a
+    constant that is added shows there. In `outward` an error is positive if the number is too large
+    in size: a factor of all velocities shows there.
     """
 
     def __init__(self) -> None:
@@ -2020,7 +2026,7 @@ class Tally:
         return self.sums[kind][0] / max(self.n, 1)
 
     def is_biased(self, kind: str) -> bool:
-        """Tell whether a mean is over one ulp and over FIVE standard errors, from 8 steps on."""
+        """Tell whether a mean is over one ulp and over five standard errors, from 8 steps on."""
         mean, squares = self.mean(kind), self.sums[kind][1]
         spread = max(squares / max(self.n, 1) - mean * mean, 0.0) / max(self.n - 1, 1)
         return self.n >= 8 and abs(mean) > 1 and mean * mean > 25 * spread
@@ -2204,7 +2210,7 @@ def read_rows(lines: Iterable[tuple[str, bytes]]) -> Iterator[tuple[str, dict[st
 
 
 def read_cell(name: str, cell: str) -> Any:
-    """Return a number or a wall; what is no number stays a text, and is no finite number then."""
+    """Return a number or a wall. A text that is no number stays a text, and is judged as one."""
     if name == "wall":
         return cell or None
     try:

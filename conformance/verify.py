@@ -57,7 +57,8 @@ if sys.version_info < (3, 10):  # noqa: UP036 - people run this file alone
     sys.exit(2)
 
 PRECISIONS = (128, 256, 512, 1024, 2048, 4096)  # bits, tried in turn
-WORK = 480_000  # units of work for a line, of some 25 microseconds each: about 12 seconds in all
+WORK = 2_400_000  # units of work for a line, of some 5 microseconds each: about 12 seconds in all
+COST = {"arc": 9, "left": 6, "right": 6}  # units of work for f of a wall; 3 for any other one
 SHARE = Fraction(61, 128)  # where a stretch is cut: not in the middle, where a root may well lie
 NEAR = Fraction(1, 2**20)  # how far from its wall a state may lie, as a share of the wall's size
 LATE = 2**30  # periods: a state at |t| as late as this may be refused
@@ -148,7 +149,8 @@ class Interval:
     def __mul__(self, other: "Interval | int") -> "Interval":
         """Return all products."""
         if isinstance(other, int):
-            other = Interval(other, other, 0, self.bits)
+            ends = self.lo * other, self.hi * other
+            return rounded(min(ends), max(ends), self.exp, self.bits)
         if self.lo == self.hi == 0 or other.lo == other.hi == 0:
             return Interval(0, 0, 0, self.bits)
         a, b, c, d = self.lo, self.hi, other.lo, other.hi
@@ -221,7 +223,9 @@ def rounded(lo: int, hi: int, exp: int, bits: int) -> Interval:
     """
     if lo == hi == 0:
         return Interval(0, 0, 0, bits)
-    extra = max(0, max(lo.bit_length(), hi.bit_length()) - bits)
+    extra = max(lo.bit_length(), hi.bit_length()) - bits
+    if extra <= 0:
+        return Interval(lo, hi, exp, bits)
     return Interval(lo >> extra, -(-hi >> extra), exp + extra, bits)
 
 
@@ -457,8 +461,7 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
     stretch that begins there has the value just after the jump.
     """
     exact = partial(number, bits=clock.bits)
-    # With more digits only cosines cost much more.
-    clock.spend(2 * len(law.waves) * (1 + clock.bits**2 // 2**18) + len(law.legs) // 8)
+    clock.spend(6 + 8 * len(law.waves) * (2**17 + clock.bits**2) // 2**17 + len(law.legs) // 2)
     if not law.legs:
         return wave_jet(law, clock.waves(s, len(law.waves)), clock.omega, exact)
     (low, high), first, jets = s.ends, law.legs[0].begin, []
@@ -472,6 +475,7 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
                 ends = max(leg.begin, since), min(leg.end, until)
                 u, bend = join(*(exact(at - leg.origin) for at in ends)), exact(leg.bend)
                 jets.append(Jet(exact(leg.c) + exact(leg.bend / 2) * u**2, bend * u, bend))
+    clock.spend(6 * len(jets))
     return Jet(*(join(*parts) for parts in zip(*jets, strict=True)))
 
 
@@ -614,7 +618,11 @@ class Flight:
         return self._laws[key]
 
     def f(self, wall: str, s: Interval) -> Jet:
-        """Enclose f of a wall, less the residual of the wall being left, over a stretch."""
+        """Enclose f of a wall, less the residual of the wall being left, over a stretch.
+
+        Nearly all work is done here and in `law_jet`, so both count it.
+        """
+        self.clock.spend(COST.get(wall, 3) * (2**20 + self.bits**2) // 2**20)
         (x, y, vx, vy), zero = self.line, self.clock.zero
         place = Jet(x + vx * s, vx, zero), Jet(y + vy * s, vy, zero)
         jet = wall_jet(self.scene, wall, lambda name: self.law(name, s), *place)
@@ -645,13 +653,14 @@ class Flight:
     def is_clear(self, wall: str, s: Interval, jet: Jet, last: Interval) -> bool:
         """Tell whether f > 0 is proved on a stretch but at its left end, where f >= 0 is known.
 
+        f > 0 does not follow from its enclosure alone: `first_root` has looked at that.
+
         Then f > 0 at its right end, where the next stretch starts. f and f' are continuous, for
         laws come to rest at their knots. f'' may jump at finitely many times. One of these suffices
         (the names are those of docs/proof.md, section 3):
 
         - rising: f' > 0;
         - concave: f'' <= 0, and f > 0 at the right end: f lies on or above its chord;
-        - as evaluated: f > 0 as enclosed;
         - falling: f' < 0, and f > 0 at the right end;
         - centred: f(p) + f'(p) (s - p) + f'' (s - p)^2 / 2 > 0 for a point p of the stretch.
           Taylor's theorem holds across the jumps, because f' is Lipschitz;
@@ -676,7 +685,7 @@ class Flight:
             return True
         if self.holds_begin(wall, s):
             return bool(self.is_flat and jet.d2.sign > 0)
-        if jet.f.sign > 0 or (jet.d1.sign < 0 and is_positive_at_end):
+        if jet.d1.sign < 0 and is_positive_at_end:
             return True
         p, half = s.simplest(), number(Fraction(1, 2), self.bits)
         at, u = self.f(wall, p), s - p
@@ -716,22 +725,24 @@ class Flight:
         """Enclose the first root of f between two points; None proves f > 0 up to `stop`.
 
         Parts are cleared from the left. So f > 0 at the left end of the part in hand, unless it
-        holds `begin`. A part has exactly one root if f' < 0 on it and f < 0 at its right end. That
+        holds `begin`. A part is clear if f > 0 as enclosed, or by `is_clear`. A part has exactly one root if f' < 0 on it and f < 0 at its right end. That
         root is the first, because all parts before it are clear. Any other part is cut in two:
         after all of `begin`, so that only the first part holds it.
 
         Raises:
             Unproved: a part stays open, or the line's work is used up.
         """
-        require(
-            self.holds_begin(wall, start) or self.f(wall, start).f.sign > 0,
-            Unproved(f"{wall}: f is not shown to be positive where the search begins"),
-        )
-        parts = [join(start, stop)]
+        parts, is_first = [join(start, stop)], True
         while parts:
-            self.clock.spend(6 + 12 * self.bits**2 // 2**20)
             part = parts.pop()
-            jet, last = self.f(wall, part), self.f(wall, part.high).f
+            jet = self.f(wall, part)
+            if jet.f.sign > 0:
+                continue
+            require(
+                not is_first or self.holds_begin(wall, start) or self.f(wall, start).f.sign > 0,
+                Unproved(f"{wall}: f is not shown to be positive where the search begins"),
+            )
+            is_first, last = False, self.f(wall, part.high).f
             if self.is_clear(wall, part, jet, last):
                 continue
             at_begin, cut = self.holds_begin(wall, part), part.cut()
@@ -759,7 +770,8 @@ class Flight:
                 lows = [narrow.low, step.low, p if f.sign > 0 else narrow.low]
                 highs = [narrow.high, step.high, p if f.sign < 0 else narrow.high]
                 narrow = join(max(lows, key=lambda p: p.ends), min(highs, key=lambda p: p.ends))
-            if not is_below((narrow.high - narrow.low) * 4, (root.high - root.low) * 3):
+            is_narrower = is_below((narrow.high - narrow.low) * 4, (root.high - root.low) * 3)
+            if not is_narrower or narrow.lo == narrow.hi:
                 return narrow
             root = narrow
 

@@ -291,7 +291,7 @@ REQUIREMENTS: dict[str, Row] = {
         SPIKE, (0.0, 0.0, -0.5, 0.0, -0.0625, None), 4.1875, 1,
     ),
     "as evaluated: f > 0": (
-        "if jet.f.sign > 0 or", "if jet.f.sign >= 0 or",
+        "if jet.f.sign > 0:", "if jet.f.sign >= 0:",
         SHAKEN, (0.0, 0.0, -0.5, 0.25, -1.0, None), 1.0, 1,
     ),
     "centred: the second order counts": (

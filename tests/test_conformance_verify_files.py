@@ -25,11 +25,11 @@ LINE: dict[str, Any] = {
     "expect": [{"outcome": "collision", "steps": [STEP]}],
 }  # fmt: skip
 FALSE = {**LINE, "t_end": 0.25}
-# It is on the left side at an irrational phase, as far as any precision shows, and far below the floor.
-SWELLING = {"kind": "fourier", "mean": 1.0, "period": 2.0, "sin": [0.25]}
+# At a third of a period the cosine is -1/2, which no precision shows: on the left side, and below the floor.
+SWELLING = {"kind": "fourier", "mean": 1.0, "period": 1.5, "cos": [0.25]}
 REFUSED = {
     **LINE, "scene": {"table": "stem", "w": SWELLING, "h": 1.0}, "expect": [{"outcome": "rejected"}],
-    "state": {**DOWN, "t": 0.5, "x": -1.25, "y": -2.0},
+    "state": {**DOWN, "t": 0.5, "x": -0.875, "y": -2.0},
 }  # fmt: skip
 WIDE = {**LINE, "expect": [{"outcome": "collision", "steps": [{**STEP, "dt": ["0.4", "0.6"]}]}]}
 TEXT, TRUE = json.dumps(LINE), "1 of 1 proved"

@@ -725,9 +725,10 @@ class Flight:
         """Enclose the first root of f between two points; None proves f > 0 up to `stop`.
 
         Parts are cleared from the left. So f > 0 at the left end of the part in hand, unless it
-        holds `begin`. A part is clear if f > 0 as enclosed, or by `is_clear`. A part has exactly one root if f' < 0 on it and f < 0 at its right end. That
-        root is the first, because all parts before it are clear. Any other part is cut in two:
-        after all of `begin`, so that only the first part holds it.
+        holds `begin`. A part is clear if f > 0 as enclosed, or by `is_clear`. A part has exactly
+        one root if f' < 0 on it and f < 0 at its right end. That root is the first, because all
+        parts before it are clear. Any other part is cut in two: after all of `begin`, so that
+        only the first part holds it.
 
         Raises:
             Unproved: a part stays open, or the line's work is used up.

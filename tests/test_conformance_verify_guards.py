@@ -269,7 +269,8 @@ def test_each_number_of_a_step_is_compared(name: str) -> None:
 )  # fmt: skip
 def test_a_number_is_two_decimals(ends: Any) -> None:
     found = {"outcome": "collision", "steps": [step("base") | {"dt": ends}]}
-    with pytest.raises(verify.Unreadable, match="dt must be"):
+    words = "dt must be" if isinstance(ends, list) else "a field dt of another type"
+    with pytest.raises(verify.Unreadable, match=words):
         judge(CAP, FALL, found)
 
 
@@ -365,3 +366,22 @@ def test_what_few_bits_leave_open_is_unproved(
     with pytest.raises(verify.Unproved, match=reason):
         next(steps)
     assert len(list(islice(verify.walk(table, given, Fraction(t_end), 256), n + 1))) == n + 1
+
+
+def test_a_search_begins_where_f_is_positive():
+    """Below the floor, on the way up, f rises through 0; that is no hit, and no wall that is never met."""
+    scene = verify.read_scene(STEM, [verify.WORK])
+    below = verify.State(*map(Fraction, (0, 0, -1.25, 0, 1)), None)
+    clock = verify.Clock(scene, below.t, 128)
+    line = [verify.number(number, 128) for number in below[1:5]]
+    flight = verify.Flight(clock, tuple(line), Fraction(9), clock.zero, state=below)
+    with pytest.raises(verify.Unproved, match="positive where the search begins"):
+        flight.first_root("floor", clock.zero, verify.number(Fraction(1, 2), 128))
+
+
+def test_few_bits_do_not_tell_whether_a_start_is_late():
+    scene = verify.read_scene({**CAP, "r": fourier()}, [verify.WORK])
+    start = verify.State(Fraction(2.0**31 * math.pi), *map(Fraction, (0, 0, 0, 0)), None)
+    assert not verify.is_extreme(scene, start, 128)
+    with pytest.raises(verify.Unproved, match="so late"):
+        verify.is_extreme(scene, start, 24)

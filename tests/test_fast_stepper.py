@@ -31,6 +31,7 @@ from fast.batch import lane_steps
 from fast.kernel import arithmetic, records
 from fast.kernel.records import BAD_QUESTION
 from fast.prepared import prepare
+from fast.units import compile_scene
 from scene import (
     BadInput,
     BangBang,
@@ -417,7 +418,7 @@ def test_what_samples_do_not_show_to_be_positive_is_told_to_be_0():
     touching = Fourier(mean=1.0, omega=1.0, cos=(1.0 - 2.0**-53,))
     assert bounds(touching).lowest < size_bounds(touching).lowest == 0.0
     scene = Cap(r=touching)
-    assert pieces.pieces_of(scene, pieces.SERIES) is None  # lanes know nothing of it
+    assert pieces.pieces_of(scene, compile_scene(scene), pieces.SERIES) is None  # lanes know nothing of it
     start = State(0.0, 0.5, 0.5, 30.0, 40.0)
     path, flow = fast.trajectory(scene, start, 100, 0.5), fast.flow(scene, [start], 0.5)
     end, arrived = path.outcome, flow.outcomes[0]

@@ -653,9 +653,8 @@ class Flight:
     def is_clear(self, wall: str, s: Interval, jet: Jet, last: Interval) -> bool:
         """Tell whether f > 0 is proved on a stretch but at its left end, where f >= 0 is known.
 
-        f > 0 does not follow from its enclosure alone: `first_root` has looked at that.
-
-        Then f > 0 at its right end, where the next stretch starts. f and f' are continuous, for
+        Its enclosure alone does not show f > 0: `first_root` asks that before. If f > 0 is proved
+        here, it holds at the right end, where the next stretch starts. f and f' are continuous, for
         laws come to rest at their knots. f'' may jump at finitely many times. One of these suffices
         (the names are those of docs/proof.md, section 3):
 
@@ -727,8 +726,8 @@ class Flight:
         Parts are cleared from the left. So f > 0 at the left end of the part in hand, unless it
         holds `begin`. A part is clear if f > 0 as enclosed, or by `is_clear`. A part has exactly
         one root if f' < 0 on it and f < 0 at its right end. That root is the first, because all
-        parts before it are clear. Any other part is cut in two: after all of `begin`, so that
-        only the first part holds it.
+        parts before it are clear. Any other part is cut in two: after all of `begin`, so that only
+        the first part holds it.
 
         Raises:
             Unproved: a part stays open, or the line's work is used up.

@@ -339,6 +339,7 @@ def test_cosines_are_taken_of_narrow_phases(bits: int) -> None:
 
 HALF_STEM = {**STEM, "w": 0.5}
 WAVY = {**STEM, "w": fourier()}
+SHALLOW = {**MUSHROOM, "w": 0.875, "h": 2.0**-8}
 ROLLING = {**MUSHROOM, "w": 0.75, "h": fourier(sin=[], cos=[0.125])}
 BREATHING = {**CAP, "r": fourier(omega=3.0, sin=[], cos=[0.25])}
 # Scene, state, horizon, bits; how many steps are proved with so few, and what is then open.
@@ -346,6 +347,7 @@ OPEN: list[tuple[dict[str, Any], dict[str, Any], float, int, int, str]] = [
     (HALF_STEM, state(0.31, -0.58, -6.48002, 4.64), 99.0, 18, 0, "two walls are met together"),
     (CAP, state(-0.14, 0.15, 0.049, -0.019), 7.8947, 16, 0, "whether y = 0 is crossed before the horizon"),
     ({**MUSHROOM, "slope": 0.25}, state(-0.05, 0.33, -0.9, -0.66), 99.0, 20, 0, "whether the mouth is open"),
+    (SHALLOW, state(0.949689, 0.030993, -42.9624, -0.7302), 99.0, 12, 0, "a wall is met at the height"),
     (ROLLING, state(-0.57, -0.41, 2.638, 0.82), 0.5, 16, 0, "right: f is too small"),
     (BREATHING, state(0.05, 0.54, -0.037, -0.068), 99.0, 16, 2, "the sign of a divisor is open"),
     (WAVY, state(1.21036, -0.5, -1.0, 0.0, t=1.0), 99.0, 16, 0, "whether the state is on wall right"),

@@ -553,9 +553,9 @@ def test_known_failures_are_marked_in_a_run(monkeypatch):
     assert run.objections() == ["made-up/0: passes, though it is listed as a known failure"]
 
 
-FLYING, MET = State(0.0, 0.0, 0.5, 0.0, 1.0), {"outcome": "collision", "wall": "arc", "dt": 0.5}
+FLYING, HIT = State(0.0, 0.0, 0.5, 0.0, 1.0), {"outcome": "collision", "wall": "arc", "dt": 0.5}
 ENDS = {
-    "collision": [MET | {"t": 0.5 * (k + 1), "x": 0.0, "y": 1.0, "vx": 0.0, "vy": -1.0} for k in range(9)],
+    "collision": [HIT | {"t": 0.5 * (k + 1), "x": 0.0, "y": 1.0, "vx": 0.0, "vy": -1.0} for k in range(9)],
     "horizon": [{"outcome": "horizon", "t": 9.0, "x": 0.0, "y": 0.5, "vx": 0.0, "vy": 1.0}] * 9,
     "undefined": [{"outcome": "undefined", "reason": "corner"}] * 9,
 }

@@ -1,12 +1,19 @@
 """Guards of the reference's proofs: bounds on either side, and questions that must stay undecided."""
 
+from fractions import Fraction
 from typing import Any
 
 import pytest
 from support.starts_by_hand import CAP, MUSHROOM, STARTS, STEM, bang_bang, fourier, state
 
 import reference
-from scene import Rejected, State, Undecided, Undefined, from_data
+from reference import arithmetic, rational
+from reference.arithmetic import Arithmetic, Exhausted, Interval, is_below
+from reference.course import Course
+from reference.isolation import Isolator
+from reference.jets import Jet
+from reference.timeline import Timeline
+from scene import Rejected, State, Undecided, Undefined, Wall, from_data
 
 MIRRORED = {"left": "right", "right": "left"}
 
@@ -88,3 +95,83 @@ def test_what_few_digits_leave_open_is_undecided(
     assert path.outcome.reason.startswith(reason)
     assert path.outcome.reason.endswith(f"({working} digits)")
     assert len(reference.trajectory(table, given, n + 1, t_end, working=60).outcomes) == n + 1
+
+
+def test_work_that_ends_anywhere_leaves_the_question_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also within the proof that the arc is never met."""
+    scene = from_data({**CAP, "r": fourier(cos=[0.125, 0.0625])})
+    start = State(0.0, 0.125, 0.25, 0.0001, 0.0001)
+    ends_within = set()
+    honest = Course._is_never_met
+
+    def watched(self: Course, wall: Wall, s: Interval) -> bool:
+        try:
+            return honest(self, wall, s)
+        except Exhausted:
+            ends_within.add(self.arithmetic.work.spent)
+            raise
+
+    monkeypatch.setattr(Course, "_is_never_met", watched)
+    for limit in range(0, 250, 10):
+        monkeypatch.setattr(arithmetic, "MAX_WORK", float(limit))
+        outcome = reference.next_collision(scene, start, 1e4, digits=10)
+        assert isinstance(outcome, Undecided)
+        assert outcome.reason.startswith(f"more than {limit} evaluations of the laws")
+    assert len(ends_within) > 5
+    monkeypatch.undo()
+    assert isinstance(reference.next_collision(scene, start, 1e4, digits=10), reference.Collision)
+
+
+SWAYING = {**STEM, "slope": bang_bang([0.0, 0.125], [1.0, 0.25], [2.0, 0.125])}
+
+
+@pytest.mark.parametrize(
+    ("y", "vy", "time"),
+    [
+        (0.5, -2.0, 0.25), (-0.5, 2.0, 0.25), (0.5, 2.0, None), (-0.5, -2.0, None),
+        (0.5, 0.0, None), (-0.5, 0.0, None), (0.0, 1.0, None), (0.0, -1.0, None), (0.0, 0.0, None),
+    ],
+)  # fmt: skip
+def test_the_mouth_is_crossed_at_a_time_ahead_or_never(y: float, vy: float, time: float | None) -> None:
+    assert rational.crossing_time(State(0.0, 0.0, y, 1.0, vy)) == time
+
+
+@pytest.mark.parametrize(
+    ("scene", "start", "wall", "time"),
+    [
+        (STEM, state(0.0, -0.5, 2.0, 0.0), "right", 0.5),
+        (STEM, state(0.0, -0.5, 2.0, 0.0), "left", None),
+        (STEM, state(0.0, -0.5, -2.0, 0.0), "left", 0.5),
+        (STEM, state(0.0, -0.5, 0.0, 1.0), "left", None),
+        (STEM, state(0.0, -0.5, 0.0, -2.0), "floor", 0.25),
+        (STEM, state(0.0, -0.5, 0.0, 2.0), "floor", None),
+        (STEM, state(1.0, -0.5, 1.0, 0.0), "right", None),
+        (STEM, state(1.0, -0.5, -1.0, 0.0, "right"), "left", 2.0),
+        (STEM, state(1.0, -0.5, -1.0, 0.0, "right"), "right", None),
+        ({**STEM, "slope": 0.25}, state(0.0, -1.0, 0.0, -2.0), "left", 1.5),
+        ({**STEM, "h": fourier()}, state(0.0, -0.5, 0.0, -2.0), "floor", None),
+        ({**STEM, "h": fourier()}, state(0.0, -0.5, 2.0, 0.0), "right", 0.5),
+        ({**STEM, "w": fourier()}, state(0.0, -0.5, 2.0, 0.0), "right", None),
+        (SWAYING, state(0.0, -0.5, 2.0, 0.0), "right", None),
+        (SWAYING, state(0.0, -0.5, 0.0, -2.0), "floor", 0.25),
+        (CAP, state(0.0, 0.5, 2.0, 0.0), "right", None),
+    ],
+)
+def test_a_straight_wall_at_rest_is_met_at_a_time_ahead_or_never(
+    scene: dict[str, Any], start: dict[str, Any], wall: Wall, time: float | None
+) -> None:
+    assert rational.straight_time(from_data(scene), State(**start), wall) == time
+
+
+@pytest.mark.parametrize("ends", [(0.3, 1.0), (0.1, 1.9), (0.0, 1.3), (0.7, 1.0)])
+def test_where_f_vanishes_half_way_the_wider_part_is_cut(ends: tuple[float, float]) -> None:
+    """Half way is a short number, which may lie aside."""
+    exact = Arithmetic(20)
+    a, b = map(exact.number, ends)
+    middle = exact.middle(exact.hull(a, b))
+    begin, one = exact.number(-1), exact.number(1)
+    still = Timeline(exact, from_data(CAP), Fraction(0))
+    search = Isolator(exact, lambda s: Jet(s - middle, one, exact.zero), begin, timeline=still)
+    is_left_wider = is_below(b - middle, middle - a)
+    assert is_left_wider == (ends in [(0.3, 1.0), (0.1, 1.9)])
+    assert is_below(search._split(a, b), middle) == is_left_wider

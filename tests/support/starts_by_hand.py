@@ -93,6 +93,8 @@ STARTS: list[tuple[dict[str, Any], dict[str, Any], float, str]] = [
     ({**STEM, "w": 4.0}, state(4.0 - 4.001 * HALF, -0.5, -1.0, 0.0, "right"), 2.0, "rejected"),
     (LEANING, state(1.5 - 1.499 * HALF, -0.5, -1.0, 0.0, "right"), 2.0, "horizon"),
     (LEANING, state(1.5 - 1.501 * HALF, -0.5, -1.0, 0.0, "right"), 2.0, "rejected"),
+    ({**STEM, "slope": 0.5}, state(0.75 - 0.999 * HALF, -0.5, -1.0, 0.0, "right"), 1.0, "horizon"),
+    ({**STEM, "slope": 0.5}, state(0.75 - 1.001 * HALF, -0.5, -1.0, 0.0, "right"), 1.0, "rejected"),
     # A wall ends where the other part of the table begins.
     (MUSHROOM, state(1.0, -HALF / 4, -1.0, 1.0, "arc"), 9.0, "rejected"),
     (MUSHROOM, state(0.5, HALF / 4, -1.0, -1.0, "right"), 9.0, "rejected"),

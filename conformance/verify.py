@@ -461,7 +461,9 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
     stretch that begins there has the value just after the jump.
     """
     exact = partial(number, bits=clock.bits)
-    clock.spend(6 + 8 * len(law.waves) * (2**17 + clock.bits**2) // 2**17 + len(law.legs) // 2)
+    # As measured. With more bits cosines cost much more, and legs hardly more.
+    waves = 8 * len(law.waves) * (2**17 + clock.bits**2) // 2**17
+    clock.spend(6 + waves + len(law.legs) // 2)
     if not law.legs:
         return wave_jet(law, clock.waves(s, len(law.waves)), clock.omega, exact)
     (low, high), first, jets = s.ends, law.legs[0].begin, []
@@ -620,7 +622,7 @@ class Flight:
     def f(self, wall: str, s: Interval) -> Jet:
         """Enclose f of a wall, less the residual of the wall being left, over a stretch.
 
-        Nearly all work is done here and in `law_jet`, so both count it.
+        Nearly all work is done here and in `law_jet`. Both count it, as measured.
         """
         self.clock.spend(COST.get(wall, 3) * (2**20 + self.bits**2) // 2**20)
         (x, y, vx, vy), zero = self.line, self.clock.zero

@@ -543,6 +543,23 @@ def test_an_allowance_that_vanishes_may_be_rounding(size):
     )
 
 
+@pytest.mark.parametrize("name", ["x", "y", "vx", "vy"])
+def test_a_coordinate_that_vanishes_is_compared_by_the_size_of_its_vector(name):
+    def line(rounding):
+        known = scaled_step(1.0, [1.0] * 5)
+        allowance = [rounding if number == name else 1.0 for number in vectors.NUMBERS]
+        step = msgspec.structs.replace(
+            known.expect[0].steps[0], **{name: ("0", "0")}, allowance=tuple(allowance)
+        )
+        return msgspec.structs.replace(
+            known, expect=(msgspec.structs.replace(known.expect[0], steps=(step,)),)
+        )
+
+    assert made.agrees(line(0.0), line(1e-31))
+    assert made.agrees(line(1e-31), line(0.0))
+    assert not made.agrees(line(0.0), line(1e-29))
+
+
 def scaled_step(size, allowance):
     """Return a line whose numbers have a size."""
     line = made.published()["moving-cap/1"]

@@ -8,6 +8,7 @@ faulty reader of each kind shows that a disagreement is seen.
 import json
 import math
 import subprocess
+from collections import Counter
 from fractions import Fraction
 from functools import cache, partial
 from types import ModuleType
@@ -20,6 +21,7 @@ from support.schemas import DOCS, validator
 
 import fast
 import fast.__main__ as fast_server
+import reference
 import reference.__main__ as reference_server
 from conformance import plain, verify
 from conformance.cases.certify import claimed_path, with_further
@@ -463,6 +465,27 @@ def test_a_particle_at_the_end_has_arrived_in_each_profile(name, profile):
     for key in range(40):
         drawn = as_profile(sample("time-left", key, False), profile)
         assert outcomes(STEPPERS[name], drawn.text())[-1] in ("horizon", "undecided"), drawn
+
+
+def test_a_particle_at_the_end_is_drawn_from_each_kind_of_start():
+    """As many of each kind, but for chance; a particle with time left is inside its table."""
+    kinds = Counter()
+    for key in range(120):
+        asked, kept = (sample("time-left", key, is_kept).request for is_kept in (False, True))
+        scene, start = from_data(asked["scene"]), State(**asked["state"])
+        assert asked["t_end"] == start.t
+        following = reference.next_collision(scene, start, start.t + 1.0, digits=10)
+        if isinstance(following, Undefined):
+            kinds[following.reason if following.reason in ("corner", "mouth-edge") else "along a wall"] += 1
+        elif abs(start.t) > 1e6:
+            kinds["early"] += 1
+        else:
+            kinds["on a wall" if start.wall else "mouth" if start.y == 0 else "inside"] += 1
+        assert kept["t_end"] > kept["state"]["t"]
+        assert kept["state"]["wall"] is None
+        assert kept["state"]["y"] != 0
+    assert set(kinds) == {"corner", "mouth-edge", "along a wall", "early", "on a wall", "mouth", "inside"}
+    assert min(kinds.values()) >= 5, kinds
 
 
 def test_steppers_decide_what_arrives():

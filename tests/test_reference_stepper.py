@@ -254,7 +254,11 @@ def test_margins_by_hand(name):
     found = margins_of(scene, state)
     for field, number in expected.items():
         margin = getattr(found, field)
-        assert margin is None if number is None else margin.contains(number)
+        if number is None:
+            assert margin is None
+        else:
+            assert margin.contains(number)
+            assert margin.extent() < 1e-25
 
 
 @pytest.mark.parametrize("near", [1e-3, 1e-9])

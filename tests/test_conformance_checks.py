@@ -1,0 +1,181 @@
+"""Parts of the checks, one by one: what is drawn, and what is said of answers that are given by hand."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import msgspec
+import pytest
+
+from conformance.cases.draw import Draw
+from conformance.profiles import margin
+from conformance.suite.checks import flows, requests
+from conformance.suite.checks.form import Implementation, octaves
+from conformance.suite.process import CheckFailure
+from conformance.suite.result import graded_parts
+from conformance.vectors import Vector, question
+from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, load
+from scene.geometry import area
+from scene.laws import bounds
+from theory import predict
+
+SCENE, START = Cap(r=1.0), State(0.0, 0.0, 0.25, 0.0, 1.0)
+UNDECIDED = {"outcome": "undecided", "reason": "shy"}
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(1.0, 8.0), (0.75, 1.0), (0.3, 1.0), (2.0**-40, 0.5), (2.0, 65536.0)]
+)
+def test_one_number_is_drawn_from_each_octave(low, high):
+    lowest = high
+    for key in range(50):
+        drawn = list(octaves(Draw(f"octaves/{key}"), low, high))
+        for k, number in enumerate(drawn):
+            assert max(low, high / 2.0 ** (k + 1)) <= number <= high / 2.0**k
+        assert high / 2.0 ** len(drawn) <= low
+        lowest = min(lowest, *drawn)
+    assert lowest < low * min(1.1, (high / low) ** 0.1)
+
+
+@pytest.mark.parametrize("make", [requests._wave, requests._legs])
+@pytest.mark.parametrize("off", [1.0, -1.0])
+@pytest.mark.parametrize(("bound", "far"), [(0.5, 1.5), (1.5, 0.5), (0.0, 1.0), (1.25, 0.75)])
+def test_a_law_that_is_broken_for_a_while_keeps_to_its_values(make, off, bound, far):
+    """It passes its bound, or stays short of it, by little; elsewhere it reaches what was asked for."""
+    law = bounds(msgspec.convert(make(bound, far, share=0.01, at=0.25, off=off), Fourier | BangBang))
+    near, most = (law.lowest, law.highest) if bound < far else (law.highest, law.lowest)
+    assert most == pytest.approx(far, abs=0.01 * abs(far - bound))
+    past = (bound - near) * (1.0 if bound < far else -1.0) * off
+    assert 0.0 < past < 0.01 * abs(far - bound)
+
+
+def arrived(x: float) -> dict[str, Any]:
+    return {"outcome": "horizon", "t": 1.0, "x": x, "y": 0.5, "vx": 0.0, "vy": 1.0}
+
+
+AMONG = {
+    "the same": (arrived(0.25), arrived(0.25), True),
+    "the same but for rounding": (arrived(0.25), arrived(0.25 + 2.0**-52), True),
+    "elsewhere": (arrived(0.25), arrived(0.26), "among others"),
+    "undecided alone": (UNDECIDED, arrived(0.25), False),
+    "undecided among others": (arrived(0.25), UNDECIDED, False),
+    "undecided for another reason": (UNDECIDED, {**UNDECIDED, "reason": "coy"}, False),
+    "rejected alone": ({"outcome": "rejected", "reason": "state"}, arrived(0.25), "among others"),
+    "rejected among others": (arrived(0.25), {"outcome": "rejected", "reason": "state"}, "among others"),
+}
+
+
+@pytest.mark.parametrize("name", AMONG)
+def test_a_state_is_answered_among_others_as_alone(name):
+    alone, among, said = AMONG[name]
+    side = SimpleNamespace(flown=lambda _, states, __: [alone if len(states) == 1 else among] * len(states))
+    if isinstance(said, bool):
+        assert flows.together(side, SCENE, [START], [0, 0], 1.0) == said
+    else:
+        with pytest.raises(AssertionError, match=said):
+            flows.together(side, SCENE, [START], [0, 0], 1.0)
+
+
+def hit(dt: float, t: float) -> dict[str, Any]:
+    return {
+        "outcome": "collision",
+        "wall": "arc",
+        "dt": dt,
+        "t": t,
+        "x": 0.0,
+        "y": 1.0,
+        "vx": 0.0,
+        "vy": -1.0,
+    }
+
+
+HIT, END = hit(0.75, 0.75), {**arrived(0.0), "t": 9.0}
+PATHS = [
+    ([HIT, HIT], 2, None), ([HIT, END], 2, None), ([END], 2, None), ([UNDECIDED], 2, None), ([HIT], 1, None),
+    ([HIT] * 9, 2, "9 steps, 9 of them collisions, are answered to 2"),
+    ([HIT, HIT, END], 2, "3 steps, 2 of them"),
+    ([HIT], 2, "1 steps, 1 of them"),
+    ([], 1, "0 steps, 0 of them"),
+    ([END, HIT], 2, "2 steps, 1 of them"),
+    ([END, END], 3, "2 steps, 0 of them"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("steps", "n", "said"), PATHS, ids=range(len(PATHS)))
+def test_a_path_has_as_many_steps_as_asked_for_or_ends(steps, n, said):
+    """A stepper whose steps go on without end is refused, and so is one that stops short."""
+    side = Implementation(SimpleNamespace(ask=lambda _: {"seq": 0, "steps": steps}), "trajectory")
+    if said is None:
+        assert len(side.path(SCENE, START, n)) == len(steps)
+    else:
+        with pytest.raises(CheckFailure, match=said):
+            side.path(SCENE, START, n)
+
+
+@pytest.mark.parametrize(
+    ("refusal", "after", "said"),
+    [
+        ("rejected", 0.75, None),
+        ("rejected", 0.76, "before"),
+        ("horizon", 0.75, "must be rejected"),
+    ],
+)
+def test_what_comes_after_a_malformed_line_is_answered_as_before(refusal, after, said):
+    is_disturbed = []
+
+    def say(line, seq):
+        is_disturbed.append(line)
+        return {"seq": seq, "outcome": refusal, "reason": "none"}
+
+    session = SimpleNamespace(
+        ask=lambda _: {"seq": 0, **hit(dt := after if is_disturbed else 0.75, dt)}, say=say
+    )
+    asked = [(START, question("step", SCENE, START, 9.0))]
+    side = Implementation(session, "step")
+    if said is None:
+        assert requests.passed_over(side, SCENE, asked)
+        assert is_disturbed == [line for line, _ in requests.MALFORMED]
+    else:
+        with pytest.raises((CheckFailure, AssertionError), match=said):
+            requests.passed_over(side, SCENE, asked)
+
+
+def test_starts_at_either_zero_go_to_every_side_that_is_open():
+    """From the mouth up and down; from a base only away from it."""
+    asked = list(requests.zeros(Draw("zeros"), "step"))
+    ways = {(type(scene), start.vy > 0, start.wall) for scene, start, _, _ in asked}
+    up, down = True, False
+    assert ways == {(Cap, up, "base"), (Stem, down, "base"), (Mushroom, up, None), (Mushroom, down, None)}
+    assert all('"y": -0.0' in line for _, _, _, line in asked)
+
+
+def test_what_no_answer_graded_is_listed(corpus: list[Vector]):
+    circle, box = {"table": "cap", "r": 1.0}, {"table": "stem", "w": 1.0, "h": 1.0}
+    cap = next(vector for vector in corpus if vector.scene == circle and vector.kind == "step")
+    rejected = msgspec.structs.replace(cap.expect[0], outcome="rejected")
+    refused = msgspec.structs.replace(cap, scene=box, expect=(rejected,))
+    found = graded_parts([cap, refused], is_timed=False)
+    assert (found["tables"], found["profiles"]) == (["cap"], ["step"])
+    assert {"stem", "mushroom", "trajectory", "flow", "time"} <= set(found["not_graded"])
+    assert not {"cap", "step"} & set(found["not_graded"])
+    timed = graded_parts([cap], is_timed=True)
+    assert timed["profiles"] == ["step", "time"]
+    assert set(timed["not_graded"]) == set(found["not_graded"]) - {"time"}
+
+
+@pytest.mark.parametrize(("energy", "bias"), [(1000.0, 0.08), (4000.0, 0.04)])
+def test_a_mean_growth_is_asked_of_as_many_particles_as_tell_it_from_0(energy, bias):
+    """Numbers between -L and L are asked about, and L is the largest growth."""
+    scene = load(flows.SCENE)
+    areas = [area(scene, scene.period * k / 64) for k in range(64)]
+    span = 2 * (math.log(max(areas) / min(areas)) + bias)
+    beyond = abs(float(predict(scene, 10).m1)) - bias
+    least = next(n for n in range(2, 5000) if margin(n, 0.0, span, flows.ALARM) <= beyond)
+
+    def asked(*_):
+        raise NotImplementedError
+
+    with pytest.raises(NotImplementedError):
+        flows._mean_growth(asked, scene, flows.Size(least, energy, bias), 1)
+    with pytest.raises(CheckFailure, match="cannot tell m1 from 0"):
+        flows._mean_growth(asked, scene, flows.Size(least - 1, energy, bias), 1)

@@ -202,6 +202,18 @@ BAD = [
 ]  # fmt: skip
 
 
+@pytest.mark.parametrize("n_left", [-1, 0, 1, 3])
+def test_the_page_of_a_check_lists_the_first_cases_and_counts_the_rest(monkeypatch, n_left):
+    """What is not listed is in the JSON report, which the page says."""
+    n_listed = len(BAD) - n_left
+    monkeypatch.setattr(check_page, "MAX_LISTED", n_listed)
+    text = re.sub(r"<[^>]+>", "", check_page.to_html(a_run(*GOOD, *BAD)))
+    rest = re.findall(r"and (-?\d+) more, in the JSON report", text)
+    assert rest == ([str(n_left)] if n_left > 0 else [])
+    assert BAD[0].id in text
+    assert (BAD[-1].id in text) == (n_left <= 0)
+
+
 def test_the_scoreboard_has_a_row_and_the_reasons_of_each_stepper():
     good, bad = a_run(*GOOD), a_run(*GOOD, *BAD, diagnosis=["Like a mutant: stale."], seconds=600.4)
     graded = [

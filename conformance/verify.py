@@ -994,7 +994,7 @@ def start(scene: Scene, state: State, t_end: Fraction, bits: int) -> tuple[Fligh
 
     A mushroom's state must lie inside the walls of its own part, cap or stem. On y = 0 beyond the
     mouth it is on the base, so the arc is asked. Inside the mouth |x| < w <= r, so the arc is not
-    asked. On the arc at y = 0 it is at a corner, so the base is asked, too.
+    asked. On the arc the base is asked, too: at y = 0 the state is at a corner.
 
     Where w = r, a state at y = 0 and |x| = w is on a side, on the base and on the arc. If it names
     the arc or the base, both of these are asked, and it is at a corner. If it names a side or no
@@ -1022,7 +1022,7 @@ def start(scene: Scene, state: State, t_end: Fraction, bits: int) -> tuple[Fligh
         is_beside = wall is None and level and -1 in (f["left"].sign, f["right"].sign)
         on = ["base"] if is_beside else on
         walls = ("arc",) if state.y > 0 or "arc" in on or "base" in on else SIDES
-        walls = ("base", "arc") if level and "arc" in on else walls
+        walls = ("base", "arc") if "arc" in on else walls
     others = [name for name in walls if name != wall]
     require(all(f[name].sign >= 0 for name in others), Refused("the state is beyond a wall"))
     if wall:

@@ -371,6 +371,15 @@ COMPLETIONS: dict[str, Row] = {
         (0.0, 0.0, 0.5, 0.0, 0.0, None), 1e308, 1,
     ),
 }  # fmt: skip
+
+
+def widen(steps: list[Any], low: str, high: str) -> list[Any]:
+    """Return a path whose numbers are enclosed widely, all but the last x, whose ends are moved."""
+    wide = [{**step, **{name: ["-1E9", "1E9"] for name in verify.NUMBERS}} for step in steps]
+    ends = [str(Decimal(end) + Decimal(by)) for end, by in zip(steps[-1]["x"], (low, high), strict=True)]
+    return [*wide[:-1], wide[-1] | {"x": ends}]
+
+
 # Requirements on the line itself, and a change to a true line: its id, where, and what stands there then.
 REJECTED = [{"outcome": "rejected"}]
 LINES: dict[str, tuple[str, str, str, list[Any], Any]] = {
@@ -378,6 +387,14 @@ LINES: dict[str, tuple[str, str, str, list[Any], Any]] = {
         "low <= least and most <= high", "True",
         "ergodic-trajectory/1", ["expect", 0, "steps", -1, "x"],
         lambda ends: [str(Decimal(end) + Decimal("1e-20")) for end in ends],
+    ),
+    "a number lies above the low end": (
+        "low <= least and most <= high", "most <= high",
+        "ergodic-trajectory/1", ["expect", 0, "steps"], lambda steps: widen(steps, "1e-20", "1"),
+    ),
+    "a number lies below the high end": (
+        "low <= least and most <= high", "low <= least",
+        "ergodic-trajectory/1", ["expect", 0, "steps"], lambda steps: widen(steps, "-1", "-1e-20"),
     ),
     "low ends lie below": (
         "require(low <= most and", "low = least\n    require(",

@@ -28,13 +28,13 @@ There are three verdicts:
 - "false": something that is proved contradicts the claim.
 - "not proved": the claim is open at each precision up to 4,096 bits, or a search took too long.
 
-Two kinds of claims stay open: two walls met together at an irrational time, and exact zeros of a
-Fourier law at a phase that is not a whole number of quarter turns.
+Two kinds of claims stay open. Two walls may be met together at an irrational time. Or f may be 0
+exactly while the phase of a Fourier law is not a whole number of quarter turns.
 
 The verifier does not judge the fields `allowance`, `condition` and `level`, the texts that describe
 a line, and the reason of a rejection. It refuses the scenes that `scene.from_data` refuses, with one
-exception: if laws of both kinds meet in one condition, `scene.from_data` also refuses scenes that
-touch or nearly touch the bound.
+exception. A condition may combine a Fourier law and a bang-bang law. There `scene.from_data` also
+refuses a scene that touches the bound, or nearly does.
 """
 
 import argparse
@@ -57,15 +57,18 @@ if sys.version_info < (3, 10):  # noqa: UP036 - people run this file alone
     sys.exit(2)
 
 PRECISIONS = (128, 256, 512, 1024, 2048, 4096)  # bits, tried in turn
-WORK = 480_000  # units of work for a line, of some 25 microseconds each: about 12 seconds in all
+WORK = 2_400_000  # units of work for a line, of some 5 microseconds each: about 12 seconds in all
+COST = {"arc": 9, "left": 6, "right": 6}  # units of work for f of a wall; 3 for any other one
 SHARE = Fraction(61, 128)  # where a stretch is cut: not in the middle, where a root may well lie
 NEAR = Fraction(1, 2**20)  # how far from its wall a state may lie, as a share of the wall's size
-LATE, LARGE = 2**30, Fraction(10**100)  # |t| in periods, or a number, from which one may refuse
-MOST_WAVES, MOST_KNOTS = 16, 256  # of a law
+LATE = 2**30  # periods: a state at |t| as late as this may be refused
+LARGE = Fraction(10**100)  # a state with a number of this size may be refused
+MOST_WAVES = 16  # of a Fourier law
+MOST_KNOTS = 256  # of a bang-bang law
 UNIT = Fraction(1, 2**53)  # unit roundoff of binary64: half a unit in the last place, relative
 BEYOND = Fraction(3, 2**12)  # how far past its end a search goes, as a share of its length
 WITHIN = 1e-9 * 2.0**53  # --answers: backward error, in ulps, beyond which a step is false
-TICKS = 2  # --answers: last places by which the time of an answer may be off, however short dt is
+TICKS = 2  # --answers: last places by which t may be off where an answer does not give dt
 FAR = 1e300  # --answers: the horizon of a path that has none
 PULSE = 5  # --answers: seconds between two lines of progress
 LARGEST = sys.float_info.max
@@ -114,8 +117,8 @@ def require(holds: object, failure: Exception) -> None:
 class Interval:
     """All real numbers from lo 2^exp to hi 2^exp.
 
-    The result of an operation holds the result for any numbers of its operands. Operations round
-    outward to `bits` binary digits. `low`, `high` and `number` keep all digits.
+    An operation returns an interval that holds the result for all numbers of its operands. It
+    rounds outward to `bits` binary digits. `low`, `high` and `number` keep all digits.
     """
 
     __slots__ = ("bits", "exp", "hi", "lo")
@@ -146,7 +149,8 @@ class Interval:
     def __mul__(self, other: "Interval | int") -> "Interval":
         """Return all products."""
         if isinstance(other, int):
-            other = Interval(other, other, 0, self.bits)
+            ends = self.lo * other, self.hi * other
+            return rounded(min(ends), max(ends), self.exp, self.bits)
         if self.lo == self.hi == 0 or other.lo == other.hi == 0:
             return Interval(0, 0, 0, self.bits)
         a, b, c, d = self.lo, self.hi, other.lo, other.hi
@@ -219,7 +223,9 @@ def rounded(lo: int, hi: int, exp: int, bits: int) -> Interval:
     """
     if lo == hi == 0:
         return Interval(0, 0, 0, bits)
-    extra = max(0, max(lo.bit_length(), hi.bit_length()) - bits)
+    extra = max(lo.bit_length(), hi.bit_length()) - bits
+    if extra <= 0:
+        return Interval(lo, hi, exp, bits)
     return Interval(lo >> extra, -(-hi >> extra), exp + extra, bits)
 
 
@@ -268,13 +274,16 @@ def pi(bits: int) -> Interval:
 
 
 def cos_sin(turns: Interval) -> tuple[Interval, Interval]:
-    """Enclose cosine and sine of so many whole turns, for a narrow interval.
+    """Enclose cosine and sine of a phase, which is given in turns and known narrowly.
 
     The nearest quarter turn is taken out. The angle left is m 2^-scale for an integer m, and up to
-    `radius` units more or less; the slopes of both functions are at most 1. |m| 2^-scale < 1, so
-    each of Taylor's terms is at most the term before. They are rounded down to integers, twice
-    each: where term k - 1 is e units too small, term k is at most (e + 1) / k + 1 too small: less
-    than 4, from e = 0 on. The series alternates, so what is left out counts as one more term.
+    `radius` units more or less. The slopes of both functions are at most 1. |m| 2^-scale < 1, so
+    each of Taylor's terms is at most the term before. Each term is rounded down twice. If term
+    k - 1 is e units too small, term k is at most (e + 1) / k + 1 units too small. From e = 0 on
+    that is always less than 4. The series alternates, so the rest counts as one more term.
+
+    Raises:
+        Unproved: the phase is known to no better than a radian.
     """
     scale, bits = turns.bits + 8, turns.bits
     quarter = floor_of(floor_of(turns.lo + turns.hi, turns.exp + 2) + 1, -1)
@@ -344,7 +353,7 @@ class Law(NamedTuple):
         waves: for k = 1, 2, ... the factors of cos and sin of k times the phase.
         legs: of a bang-bang law, two from each knot to the next, in the order of time.
         ends: a lower and an upper bound of its values, at all times.
-        is_tight: whether it attains both.
+        is_tight: whether it attains both bounds.
     """
 
     mean: Fraction
@@ -358,8 +367,8 @@ class Scene(NamedTuple):
     """A table with its laws by name; w = nu r where nu is given.
 
     What moves has one period: 2 pi / omega, or `period`, exactly. Both are None when nothing moves.
-    `work` holds one number: the units of work that are left for the line. `is_loose` tells that
-    more was given than `without_loose` keeps, so that one may refuse the scene.
+    `work` holds one number: the units of work that are left for the line. `is_loose` tells that the
+    scene has a field that one may ignore or refuse (`without_loose`).
     """
 
     table: str
@@ -416,9 +425,9 @@ class Clock:
     def waves(self, s: Interval, n: int) -> Iterator[list[Interval]]:
         """Enclose cosine and sine of k times the phase over a stretch, for k = 1 to n.
 
-        A wave turns at quarters of a turn only: cosine is 1 at quarter q if q % 4 = 0 and -1 if 2,
-        sine is 1 if 1 and -1 if 3. Between, it lies between its values at the ends. Any four
-        quarters in a row hold all of these.
+        The extremes lie at whole quarters of a turn. At quarter q, cosine is 1 if q % 4 = 0 and -1
+        if q % 4 = 2. Sine is 1 if q % 4 = 1 and -1 if q % 4 = 3. A stretch without an extreme has
+        its largest and its least value at its ends. Any four quarters in a row hold all extremes.
         """
         begin, end = self.offset + self.pace * s.low, self.offset + self.pace * s.high
         one, at_begin, at_end = number(1, self.bits), self.circle(begin, n), self.circle(end, n)
@@ -447,13 +456,14 @@ def wave_jet(
 def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
     """Enclose a law and its derivatives over a stretch of time.
 
-    Rationals tell which legs of a bang-bang law a stretch touches: it is enclosed on each, and the
-    parts are joined. f'' is enclosed but at knots and between two legs, where it jumps: there a
-    stretch that is a point has the value just after it.
+    Rationals tell which legs of a bang-bang law a stretch touches. The law is enclosed on each of
+    these legs, and the parts are joined. f'' jumps where one leg ends and the next begins. A
+    stretch that begins there has the value just after the jump.
     """
     exact = partial(number, bits=clock.bits)
-    # With more digits only cosines cost much more.
-    clock.spend(2 * len(law.waves) * (1 + clock.bits**2 // 2**18) + len(law.legs) // 8)
+    # As measured. With more bits cosines cost much more, and legs hardly more.
+    waves = 8 * len(law.waves) * (2**17 + clock.bits**2) // 2**17
+    clock.spend(6 + waves + len(law.legs) // 2)
     if not law.legs:
         return wave_jet(law, clock.waves(s, len(law.waves)), clock.omega, exact)
     (low, high), first, jets = s.ends, law.legs[0].begin, []
@@ -467,6 +477,7 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
                 ends = max(leg.begin, since), min(leg.end, until)
                 u, bend = join(*(exact(at - leg.origin) for at in ends)), exact(leg.bend)
                 jets.append(Jet(exact(leg.c) + exact(leg.bend / 2) * u**2, bend * u, bend))
+    clock.spend(6 * len(jets))
     return Jet(*(join(*parts) for parts in zip(*jets, strict=True)))
 
 
@@ -563,9 +574,9 @@ class State(NamedTuple):
 class Flight:
     """A particle in flight: where walls are on its way, and what it meets first.
 
-    Times count from the clock's instant. The line at time 0 is enclosed by a box. The flight begins
-    at some time in `begin`, which is exactly 0 for a state that is given. The true state is one of
-    those in the box, and what is proved about walls that are met holds for every state in the box.
+    Times count from the clock's instant. The place at time 0 and the velocity lie in a box. The
+    flight begins at some time in `begin`, which is exactly 0 for a state that is given. The true
+    state lies in the box, and what is proved about walls that are met holds for the whole box.
 
     The wall being left is an exception. There f is not 0 at the begin but c, the residual, because
     the state is rounded. f - c stands for f, and f - c = 0 at the begin holds for the true state
@@ -609,7 +620,11 @@ class Flight:
         return self._laws[key]
 
     def f(self, wall: str, s: Interval) -> Jet:
-        """Enclose f of a wall, less the residual of the wall being left, over a stretch."""
+        """Enclose f of a wall, less the residual of the wall being left, over a stretch.
+
+        Nearly all work is done here and in `law_jet`. Both count it, as measured.
+        """
+        self.clock.spend(COST.get(wall, 3) * (2**20 + self.bits**2) // 2**20)
         (x, y, vx, vy), zero = self.line, self.clock.zero
         place = Jet(x + vx * s, vx, zero), Jet(y + vy * s, vy, zero)
         jet = wall_jet(self.scene, wall, lambda name: self.law(name, s), *place)
@@ -640,13 +655,13 @@ class Flight:
     def is_clear(self, wall: str, s: Interval, jet: Jet, last: Interval) -> bool:
         """Tell whether f > 0 is proved on a stretch but at its left end, where f >= 0 is known.
 
-        Then f > 0 at its right end, where the next stretch starts. f and f' are continuous, for
+        Its enclosure alone does not show f > 0: `first_root` asks that before. If f > 0 is proved
+        here, it holds at the right end, where the next stretch starts. f and f' are continuous, for
         laws come to rest at their knots. f'' may jump at finitely many times. One of these suffices
         (the names are those of docs/proof.md, section 3):
 
         - rising: f' > 0;
         - concave: f'' <= 0, and f > 0 at the right end: f lies on or above its chord;
-        - as evaluated: f > 0 as enclosed;
         - falling: f' < 0, and f > 0 at the right end;
         - centred: f(p) + f'(p) (s - p) + f'' (s - p)^2 / 2 > 0 for a point p of the stretch.
           Taylor's theorem holds across the jumps, because f' is Lipschitz;
@@ -671,7 +686,7 @@ class Flight:
             return True
         if self.holds_begin(wall, s):
             return bool(self.is_flat and jet.d2.sign > 0)
-        if jet.f.sign > 0 or (jet.d1.sign < 0 and is_positive_at_end):
+        if jet.d1.sign < 0 and is_positive_at_end:
             return True
         p, half = s.simplest(), number(Fraction(1, 2), self.bits)
         at, u = self.f(wall, p), s - p
@@ -679,9 +694,9 @@ class Flight:
         return is_positive or all(self.is_never_met(wall, end, s) for end in (s.high, s.low))
 
     def holds_begin(self, wall: str, s: Interval) -> bool:
-        """Tell whether a stretch of the wall being left does not lie after all of `begin`.
+        """Tell whether f of the wall being left may vanish on a stretch because the flight begins.
 
-        There f may vanish because the flight begins, and no root is accepted.
+        It may, unless the stretch lies after all of `begin`. There no root is accepted.
         """
         return wall == self.wall and not is_below(self.begin, s.low)
 
@@ -693,8 +708,8 @@ class Flight:
         particle at rest that is not met within one period is never met.
 
         The particle at rest "begins" at -1, before the search: no stretch holds its begin, so f > 0
-        is asked from time 0 on. This is asked for stretches s longer than a period only. The search
-        is no longer, so it does not ask this again.
+        is asked from time 0 on. This is tried only if s is longer than a period. The search for the
+        particle at rest covers one period, so it never comes here again.
         """
         (x, y, vx, vy), zero, turn = self.line, self.clock.zero, self.clock.turn
         if turn is None or not is_below(turn, s.high - s.low):
@@ -711,22 +726,25 @@ class Flight:
         """Enclose the first root of f between two points; None proves f > 0 up to `stop`.
 
         Parts are cleared from the left. So f > 0 at the left end of the part in hand, unless it
-        holds `begin`. A part has exactly one root if f' < 0 on it and f < 0 at its right end. That
-        root is the first, because all parts before it are clear. Any other part is cut in two:
-        after all of `begin`, so that only the first part holds it.
+        holds `begin`. A part is clear if f > 0 as enclosed, or by `is_clear`. A part has exactly
+        one root if f' < 0 on it and f < 0 at its right end. That root is the first, because all
+        parts before it are clear. Any other part is cut in two: after all of `begin`, so that only
+        the first part holds it.
 
         Raises:
             Unproved: a part stays open, or the line's work is used up.
         """
-        require(
-            self.holds_begin(wall, start) or self.f(wall, start).f.sign > 0,
-            Unproved(f"{wall}: f is not shown to be positive where the search begins"),
-        )
-        parts = [join(start, stop)]
+        parts, is_first = [join(start, stop)], True
         while parts:
-            self.clock.spend(6 + 12 * self.bits**2 // 2**20)
             part = parts.pop()
-            jet, last = self.f(wall, part), self.f(wall, part.high).f
+            jet = self.f(wall, part)
+            if jet.f.sign > 0:
+                continue
+            require(
+                not is_first or self.holds_begin(wall, start) or self.f(wall, start).f.sign > 0,
+                Unproved(f"{wall}: f is not shown to be positive where the search begins"),
+            )
+            is_first, last = False, self.f(wall, part.high).f
             if self.is_clear(wall, part, jet, last):
                 continue
             at_begin, cut = self.holds_begin(wall, part), part.cut()
@@ -754,7 +772,8 @@ class Flight:
                 lows = [narrow.low, step.low, p if f.sign > 0 else narrow.low]
                 highs = [narrow.high, step.high, p if f.sign < 0 else narrow.high]
                 narrow = join(max(lows, key=lambda p: p.ends), min(highs, key=lambda p: p.ends))
-            if not is_below((narrow.high - narrow.low) * 4, (root.high - root.low) * 3):
+            is_narrower = is_below((narrow.high - narrow.low) * 4, (root.high - root.low) * 3)
+            if not is_narrower or narrow.lo == narrow.hi:
                 return narrow
             root = narrow
 
@@ -836,10 +855,10 @@ class Flight:
         their hit only, and then the search ends before that.
 
         The last search goes a little past the limit, so that a root at the limit lies inside the
-        stretch. There are two kinds of limit. The horizon is enclosed by self.end exactly. A
-        crossing of y = 0 lies before that, so its upper end differs from self.end; a wall that is
-        met there counts as a hit, and `earliest` decides. A wall that is met at the horizon exactly
-        is not met before it: its enclosure overlaps the horizon and holds one root only.
+        stretch. The limit is the horizon, which is self.end exactly, or a crossing of y = 0, which
+        lies before that. A root that overlaps a crossing counts as a hit, and `earliest` decides.
+        A root that overlaps the horizon counts, too, unless f = 0 at the horizon exactly. Then that
+        is the one root in its enclosure, and the wall is not met before the horizon.
         """
         for since, stop in self.stretches(start, limit.high):
             hits, queue = [], list(walls)
@@ -868,7 +887,7 @@ class Flight:
 
         The first is about as long as a crossing of the table or a period, whichever is less. Each
         next one is four times as long. The lengths affect the cost only, not what is proved. They
-        are others at each precision: where a wall is met at the end of a stretch, it is open.
+        differ from precision to precision: a wall that is met just where a stretch ends is open.
 
         A particle at rest gives no length, nor does a table at rest. If both rest, one stretch
         reaches `last`, and f is constant on it.
@@ -1095,7 +1114,7 @@ def read_scene(data: Any, work: list[int]) -> Scene:
     table = data.get("table")
     require(isinstance(table, str) and table in wanted, Refused("the scene has no known table"))
     given, is_loose = without_loose(data, ("table", "name", "notes", *LAWS[table]))
-    # Texts have no effect: one that may not stand there is ignored, or refused.
+    # Texts have no effect. One may ignore a text that is not allowed, or refuse it.
     texts = [given.pop(name, "") for name in ("name", "notes")]
     is_loose |= not all(isinstance(text, str) and not HIDDEN.search(text) for text in texts)
     read = {} if table == "cap" else {"slope": read_law(0)}
@@ -1353,8 +1372,8 @@ def require_inside(name: str, claim: Any, found: Interval) -> None:
     )
 
 
-# The fields of a line, of an answer in it and of a step, with the types that JSON has for them. A line
-# that has a field more, at any depth, is not read: somebody may take it for a part of what is proved.
+# The fields of a line, of an answer and of a step, with their types in JSON. A line with any other
+# field, at any depth, is not read: people may take that field for proved.
 NUMBER, TEXT = (int, float), (str,)
 FORMS: dict[str, dict[str, tuple[type, ...]]] = {
     "line": {
@@ -1409,12 +1428,13 @@ def require_known(record: Any) -> None:
 
 
 def require_narrow(record: Any, digits: int) -> None:
-    """Require that each enclosure of the first answer is at most 10^-digits of its larger end wide.
+    """Require that each enclosure of the proved answer is at most 10^-digits of its larger end wide.
 
     Raises:
         Unproved: an enclosure is wider.
     """
-    for place, step in enumerate(record["expect"][0].get("steps", []), 1):
+    answer, _ = claim_of(record)
+    for place, step in enumerate(answer.get("steps", []), 1):
         for name in NUMBERS:
             low, high = map(Fraction, step[name])
             require(
@@ -1480,10 +1500,10 @@ def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
 
 
 def claim_of(record: Any) -> tuple[Any, list[Any]]:
-    """Return the answer of a line that is to be proved, which does more than refuse if one does.
+    """Choose the answer of a line that is to be proved: the first that is not "rejected", if any.
 
     Returns:
-        It, and the further answers.
+        The answer, and the others.
     """
     answers = take(record, "expect", list) or [None]
     outcomes = [take(answer, "outcome", str) for answer in answers]
@@ -1495,7 +1515,7 @@ def require_listed(others: Sequence[Any], permitted: Sequence[Any]) -> None:
     """Require that a line lists each further answer that the rules permit, once, and no other.
 
     Raises:
-        Contradicted: it does not.
+        Contradicted: an answer is missing, is listed twice, or is not permitted.
     """
     require(
         all(other in permitted for other in others),
@@ -1550,7 +1570,7 @@ def thin(path: Sequence[Step], claimed: Any) -> Iterator[Step]:
     stays = list(find_stays([mark(step) for step in path]))
     kept = sorted({place for stay in stays for place in stay} | {len(path) - 1})
     listed = {place: at for at, place in enumerate(kept)}
-    # Of 1.0 and true, which equal 1 and are no places, the text is another.
+    # 1.0 and true equal 1, but they are no indices. Their texts differ.
     places = [[listed[place] for place in stay] for stay in stays]
     require(
         claimed == places and str(claimed) == str(places),
@@ -1969,7 +1989,7 @@ def measure_errors(scene: Scene, state: State, t_end: Fraction, answer: Any) -> 
 
 
 def ratio(error: Fraction, size: Fraction) -> float:
-    """Return an error in units, at most LARGE. Where nothing moves a number only 0 is no error."""
+    """Return an error in units, at most LARGE in size. If the unit is 0, any error is LARGE."""
     if size == 0:
         return float(LARGE) * ((error > 0) - (error < 0))
     return float(max(-LARGE, min(error / size, LARGE)))
@@ -1994,9 +2014,10 @@ def require_not_close(scene: Scene, state: State, t_end: Fraction, wall: Any) ->
 class Tally:
     """The errors of one number over a path: the worst, the mean, and the mean with signs.
 
-    A step that is wrong by as much in the same direction each time is a bias. It adds up over a
-    path, while errors of both signs cancel. `outward` takes an error as positive where the number
-    is too large in size: a factor of all velocities shows there, and a constant shows in `signed`.
+    A bias is an error that has the same direction at each step. It adds up over a path, while
+    errors of both signs cancel. There are two means. In `signed` errors count as they are: a
+    constant that is added shows there. In `outward` an error is positive if the number is too large
+    in size: a factor of all velocities shows there.
     """
 
     def __init__(self) -> None:
@@ -2019,7 +2040,7 @@ class Tally:
         return self.sums[kind][0] / max(self.n, 1)
 
     def is_biased(self, kind: str) -> bool:
-        """Tell whether a mean is over one ulp and over FIVE standard errors, from 8 steps on."""
+        """Tell whether a mean is over one ulp and over five standard errors, from 8 steps on."""
         mean, squares = self.mean(kind), self.sums[kind][1]
         spread = max(squares / max(self.n, 1) - mean * mean, 0.0) / max(self.n - 1, 1)
         return self.n >= 8 and abs(mean) > 1 and mean * mean > 25 * spread
@@ -2203,7 +2224,7 @@ def read_rows(lines: Iterable[tuple[str, bytes]]) -> Iterator[tuple[str, dict[st
 
 
 def read_cell(name: str, cell: str) -> Any:
-    """Return a number or a wall; what is no number stays a text, and is no finite number then."""
+    """Return a number or a wall. A text that is no number stays a text, and is judged as one."""
     if name == "wall":
         return cell or None
     try:

@@ -11,29 +11,29 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast.kernel import records
+from fast.kernel import records, rows
 from fast.kernel.compiling import kept
 from fast.kernel.follow import advance
 from fast.kernel.lane_laws import know_laws, set_reference
 from fast.kernel.laws import set_anchors
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, COARSE, FAR, MARKED, MAX_CORRECTIONS, MOVED, Compiled, FloatArray, IntArray,
-    Particle, copy_rows, load, particle_at, unfilled_ends, whole_registers,
+    ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, particle_at, unfilled_ends,
     write_state,
 )  # fmt: skip
-
 from fast.ensemble import only_stop
+from fast.kernel.rows import copy_rows, load, whole_registers
 from fast.kernel.scalar_step import KNOWN
 from fast.kernel.walls import wall_residual
 from fast.kernel.worker import DISK, GENERAL, careful_at, new_worker, run_careful
 from fast.paths import FineTrajectory, as_trajectory, fill_fine_path
 from fast.pieces import laws_in_lanes
+from fast.prepared import prepare
 from fast.step import WALL_NAMES, as_arrays, end_of_path, fitted_start
-from fast.units import compile_scene, fit, outward
+from fast.units import compile_scene, outward
 from scene import Collision, Outcome, Scene, State
 
-PLACE = (records.X, records.Y, records.VX, records.VY)
+PLACE = (rows.X, rows.Y, rows.VX, rows.VY)
 
 
 @kept(error_model="numpy")
@@ -42,10 +42,10 @@ def fill_lane(a, i, particle, age, worker):
     for early in (age, 0.0):
         load(a, i, particle, False)
         know_laws(a, i, early, worker.laws)
-        if a[records.END + i] > particle.t:
+        if a[rows.END + i] > particle.t:
             break
-    a[records.AS_GIVEN + i], a[records.STOP + i] = 0.0, np.inf
-    a[records.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
+    a[rows.AS_GIVEN + i], a[rows.STOP + i] = 0.0, np.inf
+    a[rows.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
 
 
 @kept(error_model="numpy")
@@ -53,17 +53,17 @@ def step_lanes(pool, a, n, worker, spare):
     """Take a step of n lanes where it is shown right, corrected as often as need be in a pool of one lane."""
     advance(pool, a, whole_registers(n), worker)
     for i in range(n):
-        copy_rows(a, i, spare, 0, records.T, records.POOL_SIZE)
-        while spare[records.FATE] in (COARSE, FAR):
-            if spare[records.FATE] == FAR:
-                if spare[records.TRIES] > MAX_CORRECTIONS:
+        copy_rows(a, i, spare, 0, rows.T, rows.POOL_SIZE)
+        while spare[rows.FATE] in (rows.COARSE, rows.FAR):
+            if spare[rows.FATE] == rows.FAR:
+                if spare[rows.TRIES] > rows.MAX_CORRECTIONS:
                     break
-                t = spare[records.T] + spare[records.S]
-                set_reference(spare, 0, t, spare[records.T_LOW], worker.laws)
-            if spare[records.END] == -np.inf:
+                t = spare[rows.T] + spare[rows.S]
+                set_reference(spare, 0, t, spare[rows.T_LOW], worker.laws)
+            if spare[rows.END] == -np.inf:
                 break
             advance(pool, spare, 1, worker)
-        copy_rows(spare, 0, a, i, records.T, records.POOL_SIZE)
+        copy_rows(spare, 0, a, i, rows.T, rows.POOL_SIZE)
 
 
 @kept(error_model="numpy")
@@ -116,9 +116,10 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
     Returns:
         The outcomes, and the seconds that n_times N steps took.
     """
-    starts = [fitted_start(scene, state) for state in states]
+    prepared = prepare(scene)
+    starts = [fitted_start(prepared, state) for state in states]
     rows, walls = as_arrays([particle for particle, _ in starts])
-    compiled = fit(scene).compiled
+    compiled = prepared.compiled
     take_careful_steps(compiled, rows[:0], walls[:0])  # compiles, or loads from the cache
     begin = time.perf_counter()
     codes, times, ends = take_careful_steps(compiled, rows, walls, n_times)
@@ -136,9 +137,11 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
 
 def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple[list[FineTrajectory], float]:
     """Take a fine step from each of N states, a call of compiled code for each; as `careful_steps`."""
-    starts = [fitted_start(scene, state) for state in states]
+    prepared = prepare(scene)
+    starts = [fitted_start(prepared, state) for state in states]
     steps, met = np.empty((len(states), 1, 6, 2)), np.empty((len(states), 1), dtype=np.int64)
-    compiled, particles = fit(scene).compiled, [particle for particle, _ in starts]
+    compiled = prepared.compiled
+    particles = [particle for particle, _ in starts]
     questions = [(compiled, *question) for question in zip(particles, steps, met, strict=True)]
     ends = [fill_fine_path(*question) for question in questions[:1]]  # compiles, or loads
     begin = time.perf_counter()
@@ -160,10 +163,10 @@ class LaneRound:
     def __init__(self, scene: Scene) -> None:
         self.compiled = compile_scene(scene)
         self.is_disk = bool(self.compiled.table == records.CAP)
-        self.in_lanes = laws_in_lanes(scene)
+        self.in_lanes = laws_in_lanes(scene, self.compiled)
         self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6))))
         self.anchors = np.zeros(ANCHORS_SHAPE)
-        self.pool, self.spare = np.zeros(records.POOL_SIZE), np.zeros(records.POOL_SIZE)
+        self.pool, self.spare = np.zeros(rows.POOL_SIZE), np.zeros(rows.POOL_SIZE)
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
@@ -180,9 +183,9 @@ class LaneRound:
     def step(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
         self.advance(n)
-        rows = np.column_stack([self.row(r, n) for r in (records.S, *PLACE)])
-        fates = self.row(records.FATE, n)
-        return (fates == MARKED) | (fates == MOVED), self.row(records.HIT, n).copy(), rows
+        numbers = np.column_stack([self.row(r, n) for r in (rows.S, *PLACE)])
+        fates = self.row(rows.FATE, n)
+        return (fates == rows.MARKED) | (fates == rows.MOVED), self.row(rows.HIT, n).copy(), numbers
 
     def advance(self, n: int) -> None:
         """Take a step in n lanes."""
@@ -205,11 +208,13 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
         or a flight to it (there the lanes go unfolded), and for a start that is on no wall, or on its wall
         by definition only: lanes know a particle by the wall that it has just met, and where that wall is.
     """
-    pool = LaneRound(fit(scene).scene)
+    prepared = prepare(scene)
+    pool = LaneRound(prepared.scene)
     found: list[Outcome | None] = []
-    for first in range(0, len(states), records.LANES):
-        part = states[first : first + records.LANES]
-        starts, are_met = [fitted_start(scene, state) for state in part], []
+    for first in range(0, len(states), rows.LANES):
+        part = states[first : first + rows.LANES]
+        starts = [fitted_start(prepared, state) for state in part]
+        are_met = []
         for i, (p, wall) in enumerate(zip(*as_arrays([particle for particle, _ in starts]), strict=True)):
             pool.fill(i, p, wall)
             are_met.append(pool.is_met(p, wall))

@@ -22,26 +22,44 @@ from mpmath import fp
 
 from fast.kernel import records
 from fast.kernel.arithmetic import directions
+from fast.kernel.fates import FATES, MOST_TO_A_TIME, Fate
 from fast.kernel.follow import LANE_ROWS, follow_particles
-from fast.kernel.records import BoolArray, FloatArray, Followed, IntArray, LawsInLanes, Stops, unfilled_ends
+from fast.kernel.records import (
+    BoolArray,
+    Compiled,
+    FloatArray,
+    Followed,
+    IntArray,
+    LawsInLanes,
+    Stops,
+    unfilled_ends,
+)
 from fast.kernel.single import LARGEST
 from fast.kernel.worker import awaited, interruptible, is_known_throughout, new_worker
-from fast.pieces import laws_in_lanes
-from fast.units import Units, fit, inward, outward
+from fast.prepared import Prepared, prepare
+from fast.units import Units, inward, outward
 
 from fast.validation import (  # isort: skip
-    MAX_CYCLES, MAX_FIRST, MAX_PARTICLES, MOST_IN_CYCLES, MOST_TO_A_TIME, check_energy, check_kept,
+    MAX_CYCLES, MAX_FIRST, MAX_PARTICLES, MOST_IN_CYCLES, check_energy, check_kept,
     check_phases, check_progress, check_threads,
 )  # fmt: skip
-from scene import Scene, check_scene
+from scene import Horizon, Rejected, Scene, Undecided, Undefined, check_scene
 from scene.geometry import table_at
-from scene.laws import bounds
-from scene.mouth import mouth_minima, start_time
+from scene.mouth import start_time
 from scene.notebook import rows
 from scene.refusal import BadInput, check_count, shown
 from scene.tables import laws
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
+KINDS: dict[type[Any], int] = {
+    Horizon: FOLLOWED,
+    Undecided: UNDECIDED,
+    Undefined: UNDEFINED,
+    Rejected: REJECTED,
+}
+OUTCOMES = np.full(1 + max(FATES), REJECTED, np.int8)  # by the code of a fate
+for fate in Fate:
+    OUTCOMES[fate.code] = KINDS[fate.outcome]
 SHARE = 256  # particles a worker takes at a time, for each cycle: several times what it holds at once
 
 
@@ -245,26 +263,20 @@ def _uniform_in_area(
     return np.where(in_cap, rho * along[:, 0], side), np.where(in_cap, rho * along[:, 1], -depth)
 
 
-def one_cycle(scene: Scene) -> float:
-    """Return how long a cycle takes [time]: the period of the laws, 1 for a static scene."""
-    return scene.period or 1.0
-
-
-def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
+def cycle_stops(prepared: Prepared, n_cycles: int, phases: Sequence[float]) -> Stops:
     """Return the stops of whole cycles: at each of `phases` (fractions of a cycle, rising) and the end.
 
     The minima of nu are stops too; one at the end of a cycle comes before that end.
     """
-    start, span = start_time(scene), one_cycle(scene)
     count = np.arange(n_cycles)
-    narrow = np.array(mouth_minima(scene))
+    narrow = np.array(prepared.minima)
     parts = np.array([*narrow, *phases, 1.0])
     columns = np.full((n_cycles, len(parts)), -1)
     columns[:, len(narrow) :] = np.arange(n_cycles * (len(phases) + 1)).reshape(n_cycles, -1)
     cycles = np.full(columns.shape, -1)
     cycles[:, -1] = count
     order = np.argsort(parts, kind="stable")
-    times = start + span * (count[:, None] + parts[None, :])
+    times = prepared.start + prepared.cycle * (count[:, None] + parts[None, :])
     return Stops(
         times[:, order].ravel(),
         columns[:, order].ravel(),
@@ -289,11 +301,11 @@ def only_stop(t_end: float) -> Stops:
     )
 
 
-def least_collisions(scene: Scene, speed: float, span: float) -> float:
+def least_collisions(compiled: Compiled, speed: float, span: float) -> float:
     """Return how many flights of the table's full length fit into a path at this speed [collisions]."""
-    found = {name: bounds(law).highest for name, law in laws(scene).items() if name != "slope"}
-    r, h = found.get("r", 0.0), found.get("h", 0.0)
-    w = found.get("w", found.get("nu", 0.0) * r)
+    r, w, h = (
+        float(compiled.bounds[row, records.HIGHEST]) for row in (records.RADIUS, records.WIDTH, records.DEPTH)
+    )
     return speed * span / (2.0 * max(r, w) + r + h)
 
 
@@ -301,14 +313,15 @@ class Plan(NamedTuple):
     """What an ensemble is asked for, checked, as the kernel takes it.
 
     Attributes:
-        scene, units: the scene in the kernel's units, and these.
+        prepared: the scene.
+        units: those of its particles.
         energy0: of every particle, as given.
         size: particles, cycles, looks at a particle in a cycle.
         seed, first, threads, progress: see `simulate`.
         stops: when particles are looked at.
     """
 
-    scene: Scene
+    prepared: Prepared
     units: Units
     energy0: float
     size: tuple[int, int, int]
@@ -321,7 +334,7 @@ class Plan(NamedTuple):
     def starts(self) -> FloatArray:
         """Return the states that particles start from."""
         energy = inward("energy", self.energy0, self.units.of_energy())
-        return initial_states(self.scene, self.size[0], energy, self.seed, self.first)
+        return initial_states(self.prepared.scene, self.size[0], energy, self.seed, self.first)
 
     def followed(
         self, states: FloatArray, n_lane_rows: int = 0, lanes: FloatArray | None = None, n_passed: int = 0
@@ -341,7 +354,8 @@ class Plan(NamedTuple):
         done = unfilled_ends(states, n_columns, self.stops.mouth_minima.shape, n_lane_rows)
         if lanes is not None:
             done.lanes[:] = lanes
-        free, in_lanes = np.full(len(states), records.NO_WALL), laws_in_lanes(self.scene)
+        free = np.full(len(states), records.NO_WALL)
+        in_lanes = self.prepared.in_lanes
         return done, follow_many(in_lanes, done, free, self.stops, self.threads, self.progress, n_passed)
 
     def ensemble(self, done: Followed, seconds: float) -> Ensemble:
@@ -398,12 +412,12 @@ def planned(
     first = check_count("first", first, 0, MAX_FIRST)
     energy, phases = check_energy(energy), check_phases(phases)
     threads, progress = check_threads(threads), check_progress(progress)
-    fitted = fit(scene)
+    prepared = prepare(scene)
     # A static table is followed for units of the caller's time.
-    units = Units(fitted.length, fitted.time or 0)
-    scene, speed2 = fitted.scene, 2.0 * inward("energy", energy, units.of_energy())
-    check_kept(n_particles, n_cycles, len(phases), len(mouth_minima(scene)))
-    ahead = least_collisions(scene, math.sqrt(speed2), n_cycles * one_cycle(scene))
+    units = Units(prepared.length, prepared.time or 0)
+    speed2 = 2.0 * inward("energy", energy, units.of_energy())
+    check_kept(n_particles, n_cycles, len(phases), len(prepared.minima))
+    ahead = least_collisions(prepared.compiled, math.sqrt(speed2), n_cycles * prepared.cycle)
     if ahead > MOST_IN_CYCLES:
         raise BadInput(
             f"energy = {energy}: over {ahead:.0e} collisions of each particle, must be at most 1e9"
@@ -412,8 +426,9 @@ def planned(
         raise BadInput(
             f"energy = {energy}: the speed must be at least 2^-400 beside the table's size and period"
         )
-    size, stops = (n_particles, n_cycles, len(phases) + 1), cycle_stops(scene, n_cycles, phases)
-    return Plan(scene, units, energy, size, seed, first, threads, progress, stops)
+    size = (n_particles, n_cycles, len(phases) + 1)
+    stops = cycle_stops(prepared, n_cycles, phases)
+    return Plan(prepared, units, energy, size, seed, first, threads, progress, stops)
 
 
 def _share(n: int, threads: int, n_cycles: int) -> int:
@@ -428,8 +443,8 @@ def _share(n: int, threads: int, n_cycles: int) -> int:
 
 def outcomes(ends: IntArray) -> npt.NDArray[np.int8]:
     """Return 0, 1, 2, 3 for particles followed to the end, undecided, undefined, rejected."""
-    kinds = [ends == records.HORIZON, ends < records.FAR_TIME, ends < records.APPROACHING]
-    return np.select(kinds, [FOLLOWED, UNDEFINED, UNDECIDED], REJECTED).astype(np.int8)
+    found: npt.NDArray[np.int8] = OUTCOMES[ends]
+    return found
 
 
 def follow_many(
@@ -543,7 +558,7 @@ def go_on(
     n_before, n_passed = _passed(plan, before)
     unknown = np.full((plan.size[0], 6), np.nan)
     done, seconds = plan.followed(unknown, LANE_ROWS, before.lanes, n_passed)
-    after, anew = plan.ensemble(done, seconds), np.flatnonzero(done.codes == records.ANEW)
+    after, anew = plan.ensemble(done, seconds), np.flatnonzero(done.codes == records.FOLLOW_ANEW)
     for name in BY_CYCLE:
         getattr(after, name)[:, :n_before] = getattr(before.ensemble, name)
     if len(anew):
@@ -602,7 +617,8 @@ def _passed(plan: Plan, before: Paused) -> tuple[int, int]:
     if not 1 <= n_before <= n_cycles:
         raise BadInput(f"n_cycles = {n_cycles}, must be at least the {n_before} of before")
     n_passed = n_before * (len(plan.stops.times) // n_cycles)
-    in_lanes, times = laws_in_lanes(plan.scene), plan.stops.times
+    in_lanes = plan.prepared.in_lanes
+    times = plan.stops.times
     if is_known_throughout(in_lanes, times[n_passed - 1]) != is_known_throughout(in_lanes, times[-1]):
         raise BadInput(
             f"n_cycles = {n_cycles}: beyond the time up to which lanes know the laws' phases. Lanes followed"

@@ -1,7 +1,7 @@
 """Given particles: paths from collision to collision, in binary64 or to 31 decimals; until an event; a flow.
 
 A trajectory carries its time as a sum of two floats, and takes the steps of the lanes where they are shown
-right (fast.kernel.follow). A fine trajectory carries all its numbers so (fast.kernel.fine_step). Events are
+right (fast.kernel.path). A fine trajectory carries all its numbers so (fast.kernel.fine_step). Events are
 sought among the collisions of a trajectory: the arc hit with which a capture interval begins, the hit with
 which it ends, or the hit after which an energy is reached. A flow carries particles to a time, as ensembles
 are followed.
@@ -21,22 +21,24 @@ from mpmath import fp
 
 from fast.ensemble import follow_many, least_collisions, only_stop
 from fast.kernel import records
+from fast.kernel.fates import MOST_TO_A_TIME, Fate
 from fast.kernel.fine_step import FineState, fine_path
-from fast.kernel.follow import PATHS, follow_particles
+from fast.kernel.follow import follow_particles
+from fast.kernel.path import PATHS
 
 from fast.kernel.records import (  # isort: skip
     ANCHORS_SHAPE, ANSWER_LOST, Compiled, FloatArray, IntArray, Particle, unfilled_ends,
 )  # fmt: skip
 from fast.kernel.worker import Loops, careful_at, follow_path, new_worker
-from fast.pieces import laws_in_lanes
+from fast.prepared import prepare
 
 from fast.step import (  # isort: skip
     WALL_NAMES, as_arrays, end_of_path, fitted_start, next_collision, start_at,
 )  # fmt: skip
-from fast.units import LateTime, Units, fit, scaled
+from fast.units import LateTime, Units, scaled
 
 from fast.validation import (  # isort: skip
-    MAX_STEPS, MOST_TO_A_TIME, check_end, check_energy, check_states, check_threads,
+    MAX_STEPS, check_end, check_energy, check_states, check_threads,
 )  # fmt: skip
 from scene import InvalidState, Mushroom, Outcome, Rejected, Scene, State, Undecided, Wall, check_scene
 from scene.geometry import half_width
@@ -82,11 +84,13 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     check_scene(scene)
     t_end = check_end(t_end)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
+    prepared = prepare(scene)
     try:
-        start, units = start_at(scene, state, min(t_end, sys.float_info.max))
+        start, units = start_at(prepared, state, min(t_end, sys.float_info.max))
     except LateTime as error:
         return Collisions([], np.empty((0, 6)), Undecided(str(error)))
-    in_lanes, exponents = laws_in_lanes(fit(scene).scene), units.of_step()
+    in_lanes = prepared.in_lanes
+    exponents = units.of_step()
     rows, (wall,) = as_arrays([start])
     stop = only_stop(units.horizon(t_end))
     worker = new_worker(in_lanes, stop, unfilled_ends(rows), loops=Loops(careful_at(), 0, 0))
@@ -94,7 +98,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     halves = np.stack([exponents // 2, exponents - exponents // 2])
     factors = np.ldexp(1.0, np.vstack([halves, -halves]))
     steps, walls = np.empty((n_collisions, 6)), np.empty(n_collisions, np.int64)
-    kernel = PATHS[in_lanes.is_slope_moving, in_lanes.degree]
+    kernel = PATHS[in_lanes.is_slope_moving, in_lanes.form]
     with np.errstate(over="ignore", under="ignore"):  # without the compiler
         n, code = follow_path(kernel, (worker, wall, factors, steps, walls), n_collisions, stop.called_off)
     steps = steps[:n] if n == n_collisions else steps[:n].copy()  # not all room is held
@@ -154,12 +158,13 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
     """
     check_scene(scene)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
+    prepared = prepare(scene)
     try:
-        start, units = start_at(scene, state)
+        start, units = start_at(prepared, state)
     except LateTime as error:
         return FineTrajectory([], np.empty((0, 6, 2)), Undecided(str(error)))
     steps, walls = np.empty((n_collisions, 6, 2)), np.empty(n_collisions, dtype=np.int64)
-    end = fill_fine_path(fit(scene).compiled, start, steps, walls)
+    end = fill_fine_path(prepared.compiled, start, steps, walls)
     return as_trajectory(scene, state, units, end, steps, walls)
 
 
@@ -180,7 +185,7 @@ def as_trajectory(
     found, is_kept = scaled(steps[:n], units.of_step()[:, None])
     n_exact = int(np.append(is_kept.all(axis=(1, 2)), False).argmin())
     if n_exact < n:
-        n, code = n_exact, ANSWER_LOST
+        n, code = n_exact, Fate.ANSWER_LOST.code
     outcome: Outcome | None = None
     if n < len(steps):
         outcome = end_of_path(code, scene, state, n, np.inf, place_after(found[:n, :, 0], state))
@@ -362,7 +367,8 @@ def carry(
     Raises:
         BadInput: the scene does not fit into binary64: see fast.units.
     """
-    starts = {i: fitted_start(scene, states[i]) for i, refusal in enumerate(refusals) if refusal is None}
+    prepared = prepare(scene)
+    starts = {i: fitted_start(prepared, states[i]) for i, refusal in enumerate(refusals) if refusal is None}
     every, outcomes, seconds = unfilled_ends(np.empty((len(states), 6))), list(refusals), 0.0
     for units in sorted({units for _, units in starts.values()}):
         those = [i for i, start in starts.items() if start[1] == units]
@@ -370,13 +376,12 @@ def carry(
         done = unfilled_ends(rows)
         stop = only_stop(units.horizon(t_end))
         fastest, longest = np.hypot(rows[:, 4], rows[:, 5]).max(), stop.times[0] - rows[:, 0].min()
-        in_lanes = laws_in_lanes(fit(scene).scene)
-        if len(rows) * least_collisions(fit(scene).scene, fastest, longest) < FEW and all(
+        if len(rows) * least_collisions(prepared.compiled, fastest, longest) < FEW and all(
             len(trajectory(scene, states[i], FEW, t_end).walls) < FEW for i in those
         ):  # as a path each is short: the bound alone is no argument, for a particle may skip along the arc
-            follow_particles(new_worker(in_lanes, stop, done), walls)
+            follow_particles(new_worker(prepared.in_lanes, stop, done), walls)
         else:
-            seconds += follow_many(in_lanes, done, walls, stop, threads)
+            seconds += follow_many(prepared.in_lanes, done, walls, stop, threads)
         # t, its low part, x, y, vx, vy; begin and end of the capture interval
         numbers = np.column_stack([done.states, done.t_in[:, 0, 0], done.t_out[:, 0, 0]])
         numbers, is_kept = scaled(numbers, np.append(units.of_step(), [units.time, units.time]))
@@ -397,8 +402,9 @@ def refuse(scene: Scene, state: State, t_end: float) -> Rejected | Undecided | N
     outcome = next_collision(scene, state, t_end)
     if isinstance(outcome, Rejected | Undecided):
         return outcome
-    p, units = fitted_start(scene, state)
-    ahead = least_collisions(fit(scene).scene, math.hypot(p.vx, p.vy), units.horizon(t_end) - p.t)
+    prepared = prepare(scene)
+    p, units = fitted_start(prepared, state)
+    ahead = least_collisions(prepared.compiled, math.hypot(p.vx, p.vy), units.horizon(t_end) - p.t)
     if ahead > MOST_TO_A_TIME:
         return Undecided(f"t_end = {t_end!r} is over {ahead:.0e} collisions away, must be at most 1e7")
     return None

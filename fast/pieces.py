@@ -15,7 +15,6 @@ piece is halved again: else the rounding of the terms would be far more than tha
 
 import math
 from fractions import Fraction
-from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -29,7 +28,6 @@ from fast.kernel.records import (  # isort: skip
     N_HARMONICS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled,
     FloatArray, LaneWaves, LawLimits, LawsInLanes, Pieces,
 )  # fmt: skip
-from fast.units import compile_scene
 from scene import Scene, tables
 from scene.laws import breakpoints, is_constant
 
@@ -53,10 +51,13 @@ class Cut(NamedTuple):
     holds: Fraction
 
 
-@lru_cache(maxsize=64)
-def laws_in_lanes(scene: Scene) -> LawsInLanes:
-    """Return a scene, which is in the kernel's units, as the lanes know it."""
-    compiled = compile_scene(scene)
+def laws_in_lanes(scene: Scene, compiled: Compiled) -> LawsInLanes:
+    """Return a scene as the lanes know it.
+
+    Args:
+        scene: in the kernel's units.
+        compiled: its numbers.
+    """
     laws, waves = compiled.laws, waves_of(compiled)
     if waves:
         form = TWO_WAVES if laws[SHARED, N_HARMONICS] > 1 else ONE_WAVE
@@ -65,13 +66,14 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
         pieces = NO_PIECES._replace(period=period, until=_until(laws, period))
     else:
         form = SERIES if (laws[:SHARED, KIND] == FOURIER).any() else PARABOLA
-        pieces = pieces_of(scene, form) or NO_PIECES
+        pieces = pieces_of(scene, compiled, form) or NO_PIECES
     return LawsInLanes(
         compiled,
         limits_of(compiled),
         pieces,
         waves or NO_WAVES,
         form,
+        is_waves=waves is not None,
         is_slope_moving=bool(laws[SLOPE, KIND] != CONSTANT),
         slope=float(laws[SLOPE, LEVEL]),
     )
@@ -152,9 +154,8 @@ def least_of(compiled: Compiled, row: int | np.integer) -> float:
     return float(bounds[row, LOWEST])
 
 
-def pieces_of(scene: Scene, degree: int) -> Pieces | None:
+def pieces_of(scene: Scene, compiled: Compiled, degree: int) -> Pieces | None:
     """Return a scene's laws, one of which moves, as polynomials of a degree; None if it takes too many."""
-    compiled = compile_scene(scene)
     period, origin = _period_and_origin(compiled.laws)
     longest = reach(compiled, degree)
     if not longest > 0.0:

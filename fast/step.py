@@ -7,11 +7,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from fast.kernel import records, scalar_step, single
+from fast.kernel import records, single
+from fast.kernel.fates import FATES, Fate
 from fast.kernel.records import FloatArray, IntArray, Particle
 from fast.kernel.worker import careful_at
-from fast.units import ANSWER_LOST, LateTime, Units, fit
-from fast.validation import MOST_TO_A_TIME
+from fast.prepared import Prepared, prepare
+from fast.units import LateTime, Units
 from scene import (
     BadInput,
     Collision,
@@ -22,7 +23,6 @@ from scene import (
     Scene,
     State,
     Undecided,
-    Undefined,
     Wall,
     check_scene,
 )
@@ -36,21 +36,8 @@ WALL_NAMES: dict[int, Wall] = {
     int(records.RIGHT): "right",
     int(records.FLOOR): "floor",
 }
+BEYOND: dict[Fate, Wall] = {FATES[Fate.BEYOND_ARC.code + code]: wall for code, wall in WALL_NAMES.items()}
 WALL_CODES: dict[Wall | None, int] = {None: int(records.NO_WALL)} | {n: c for c, n in WALL_NAMES.items()}
-REASONS: dict[int, Outcome] = {
-    int(records.SLIDING): Undefined("sliding"),
-    int(records.MOUTH_EDGE): Undefined("mouth-edge"),
-    int(records.ON_CORNER): Undefined("corner"),
-    int(records.TOO_MANY): Undecided(f"no hit within {scalar_step.MAX_PARABOLAS} sub-intervals"),
-    int(records.TANGENT): Undecided("f and f' vanish together within rounding"),
-    int(records.CORNER): Undecided("two walls are hit together within rounding"),
-    int(records.EDGE): Undecided("the mouth's edge is hit within rounding"),
-    int(records.AT_END): Undecided("a wall is hit at the horizon within rounding"),
-    int(records.START): Undecided("the state is on another wall within rounding"),
-    int(records.TOO_FAR): Undecided(f"t_end is over {MOST_TO_A_TIME:.0e} collisions away"),
-    int(records.ANSWER_LOST): Undecided(ANSWER_LOST),
-    int(records.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
-}
 
 
 def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
@@ -76,11 +63,12 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
     try:
         if not is_plain(scene, state, t_end):
             state, t_end = check_numbers(scene, state, t_end), float(t_end)
+        prepared = prepare(scene)
         t, x, y, vx, vy, wall = state.t, state.x, state.y, state.vx, state.vy, WALL_CODES[state.wall]
-        ask, numbers = single.single_at_once(), fit(scene).packed
-        code, dt, t, x, y, vx, vy = ask(careful_at(), numbers, t, x, y, vx, vy, wall, t_end)
+        ask = single.single_at_once()
+        code, dt, t, x, y, vx, vy = ask(careful_at(), prepared.packed, t, x, y, vx, vy, wall, t_end)
         if code == records.BAD_QUESTION:  # by checks in compiled code: those that follow say why
-            start_at(scene, state, t_end)[1].horizon(t_end)
+            start_at(prepared, state, t_end)[1].horizon(t_end)
     except LateTime as error:
         return Undecided(str(error))
     except BadInput as error:
@@ -100,23 +88,22 @@ def is_plain(scene: Scene, state: State, t_end: float) -> bool:
     )
 
 
-def start_at(scene: Scene, state: State, t_end: float = sys.float_info.max) -> tuple[Particle, Units]:
+def start_at(prepared: Prepared, state: State, t_end: float = sys.float_info.max) -> tuple[Particle, Units]:
     """Return a state in the kernel's units; refuse what this stepper cannot hold, naming field and bound."""
-    return fitted_start(scene, check_numbers(scene, state, t_end))
+    return fitted_start(prepared, check_numbers(prepared.given, state, t_end))
 
 
-def fitted_start(scene: Scene, state: State) -> tuple[Particle, Units]:
+def fitted_start(prepared: Prepared, state: State) -> tuple[Particle, Units]:
     """Return a state that has been checked, in the kernel's units, and these.
 
     Raises:
         BadInput: scene or state do not fit, or the state is not on the wall that it names.
     """
-    fitted = fit(scene)
-    units = fitted.units(state)
+    units = prepared.units(state)
     t, x, y, vx, vy = units.numbers(state)
     particle = Particle(t, 0.0, x, y, vx, vy, WALL_CODES[state.wall])
     if state.wall is not None:
-        share = single.off_wall(careful_at(), fitted.compiled, particle)
+        share = single.off_wall(careful_at(), prepared.compiled, particle)
         if share:
             away = f"{share:.3g} of that wall's size"
             raise InvalidState(f"state.wall = {state.wall!r}, but the state is {away} away from that wall")
@@ -138,16 +125,18 @@ def end_of_path(
     """
     if code == records.HORIZON:
         return Horizon(t_end, *map(float, place))
-    if code == records.START and not n:
+    fate = FATES[code]
+    if fate is Fate.NEAR_START and not n:
         wall = rounded(scene, state.t).nearest_wall(state.x, state.y, but=state.wall)
         return Undecided(placed(scene, state, wall, "within rounding of"))
     since = f"{n} collisions after state.t = {state.t!r}" if n else f"state.t = {state.t!r}"
-    if code == records.FAR_TIME:
-        return Undecided(
-            f"{since}: too late: at the highest harmonic a phase exceeds 2^27 quarter turns, which binary64"
-            " cannot resolve"
-        )
-    found = REASONS.get(code)
-    if n and (found is None or isinstance(found, Rejected)):
+    if fate is Fate.TOO_LATE:
+        return Undecided(f"{since}: {fate.value}")
+    if fate.outcome is not Rejected:
+        answer: Outcome = fate.outcome(fate.value)
+        return answer
+    if n:
         return Undecided(f"{since}: rounding puts the particle beyond a wall")
-    return found or Rejected(placed(scene, state, WALL_NAMES[int(code - records.BEYOND)], "beyond"))
+    if fate in BEYOND:
+        return Rejected(placed(scene, state, BEYOND[fate], "beyond"))
+    return Rejected(fate.value)

@@ -16,7 +16,6 @@ import math
 import sys
 from copy import copy
 from fractions import Fraction
-from functools import lru_cache
 from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
@@ -25,7 +24,8 @@ import numpy as np
 
 from fast.kernel import records
 from fast.kernel.arithmetic import HALF_PI, split
-from fast.kernel.single import LARGEST, LENGTH, TIME, pack_scene, static_time
+from fast.kernel.fates import Fate
+from fast.kernel.single import LARGEST, LENGTH, TIME
 
 from fast.kernel.records import (  # isort: skip
     BANG_BANG, CONSTANT, FOURIER, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, BoolArray, Compiled,
@@ -39,7 +39,6 @@ from scene.transforms import scaled_law, times_power
 TABLES = {"Cap": int(records.CAP), "Stem": int(records.STEM), "Mushroom": int(records.MUSHROOM)}
 
 
-@lru_cache(maxsize=256)
 def compile_scene(scene: Scene) -> Compiled:
     """Lay out a valid scene for the kernel.
 
@@ -114,9 +113,6 @@ def _product_bounds(factors: tuple[Law, ...]) -> Bounds:
     )
 
 
-ANSWER_LOST = "the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023"
-
-
 class LateTime(InvalidState):
     """A time that is too large beside the table's period: good input, which this stepper cannot answer."""
 
@@ -172,55 +168,30 @@ class Units(NamedTuple):
         return 2 * (self.length - self.time)
 
 
-class Fitted(NamedTuple):
-    """A scene in the kernel's units.
-
-    Attributes:
-        scene: with its lengths and times divided by the units.
-        length: exponent of the unit of length.
-        time: exponent of the unit of time; None for a static table, which leaves it to the state.
-        compiled: its numbers for the kernels.
-        packed: the same in one array.
-    """
-
-    scene: Scene
-    length: int
-    time: int | None
-    compiled: Compiled
-    packed: FloatArray
-
-    def units(self, state: State) -> Units:
-        """Return the units for one state: all that depends on it is a static table's unit of time."""
-        speed = max(abs(state.vx), abs(state.vy))
-        return Units(self.length, static_time(self.length, speed) if self.time is None else self.time)
-
-
-@lru_cache(maxsize=256)
-def fit(scene: Scene) -> Fitted:
-    """Bring a scene to the kernel's units.
-
-    Raises:
-        BadInput: a number of the scene loses bits beside the table's size and period, or a wall is too fast.
-    """
+def units_of(scene: Scene) -> tuple[int, int | None]:
+    """Return the exponents of a scene's units of length and time; None for the time of a static table."""
     sizes = [level(law) for name, law in laws(scene).items() if name in ("r", "w", "h")]
     length = exponent(max(sizes)) - LENGTH
     shared = period(scene)
-    time = None
-    if shared is not None:
-        if shared.omega is not None:
-            time = -exponent(shared.omega) - TIME
-        else:
-            assert shared.length is not None  # a float, as the scene has found
-            time = exponent(float(shared.length)) - TIME
-    changed = {
-        name: _in_units(f"scene.{name}", law, 0 if name in ("nu", "slope") else length, time or 0)
-        for name, law in laws(scene).items()
-    }
-    fitted = copy(scene)  # which is valid, and so is the same table in other units: one proof serves both
-    for name, law in changed.items():
-        msgspec.structs.force_setattr(fitted, name, law)
-    compiled = compile_scene(fitted)
-    return Fitted(fitted, length, time, compiled, pack_scene(compiled, length, time))
+    if shared is None:
+        return length, None
+    if shared.omega is not None:
+        return length, -exponent(shared.omega) - TIME
+    assert shared.length is not None  # a float, as the scene has found
+    return length, exponent(float(shared.length)) - TIME
+
+
+def in_units(scene: Scene, length: int, time: int) -> Scene:
+    """Return a scene with its lengths divided by 2^length and its times by 2^time, exactly.
+
+    Raises:
+        BadInput: a number of the scene loses bits beside the table's size and period.
+    """
+    found = copy(scene)  # which is valid, and so is the same table in other units: one proof serves both
+    for name, law in laws(scene).items():
+        changed = _in_units(f"scene.{name}", law, 0 if name in ("nu", "slope") else length, time)
+        msgspec.structs.force_setattr(found, name, changed)
+    return found
 
 
 def exponent(size: float) -> int:
@@ -267,7 +238,7 @@ def outward(numbers: FloatArray, exponents: IntArray | int) -> FloatArray:
     """
     found, is_kept = scaled(numbers, exponents)
     if not is_kept.all():
-        raise BadInput(ANSWER_LOST)
+        raise BadInput(Fate.ANSWER_LOST.value)
     return found
 
 

@@ -16,8 +16,7 @@ from scene.refusal import BadInput, check_count, check_list, check_number, shown
 from scene.states import check_numbers
 
 MAX_STEPS = 10**7  # collisions of one trajectory, kept in memory: half a gigabyte
-# Collisions of one particle: on the way to a given time, some seconds of work; in an ensemble, a minute.
-MOST_TO_A_TIME, MOST_IN_CYCLES = 10**7, 10**9
+MOST_IN_CYCLES = 10**9  # collisions of one particle of an ensemble: a minute of work
 MAX_PARTICLES = 10**8
 MAX_FIRST = 2**62  # number of a first particle: what is added to it stays a 64-bit integer
 MAX_CYCLES = 10**6

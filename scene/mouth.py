@@ -36,6 +36,11 @@ def start_time(scene: Scene) -> float:
     return next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
 
 
+def one_cycle(scene: Scene) -> float:
+    """Return how long a cycle takes [time]: the period of the laws, 1 for a static scene."""
+    return scene.period or 1.0
+
+
 def mouth_factors(scene: Mushroom) -> tuple[Law, Law]:
     """Return two laws whose quotient is nu."""
     if scene.nu is not None:

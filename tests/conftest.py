@@ -23,8 +23,7 @@ from support.entries import kept_entries
 import fast
 from conformance.suite import run as suite
 from conformance.vectors import Vector, load
-from fast.pieces import laws_in_lanes
-from fast.units import compile_scene, fit
+from fast.prepared import prepare
 from mushrooms.main import run
 from scene import Scene
 
@@ -157,12 +156,9 @@ def unsynced(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def uncached() -> Iterator[None]:
     """Forget what was made of scenes, for a test that changes how it is made, and what it made afterwards."""
-    made = (compile_scene, fit, laws_in_lanes)
-    for each in made:
-        each.cache_clear()
+    prepare.cache_clear()
     yield
-    for each in made:
-        each.cache_clear()
+    prepare.cache_clear()
 
 
 @pytest.fixture

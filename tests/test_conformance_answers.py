@@ -27,6 +27,9 @@ LATE = {**DOWN, "t": 0.25, "y": 0.25, "wall": None}
 FALLING = {**DOWN, "t": -0.5}
 TINY = {"table": "cap", "r": 2.0**-130}
 TINY_DOWN = {**DOWN, "y": 2.0**-131, "vy": -(2.0**-130)}
+# At a third of a period the cosine is -1/2, which no precision shows: the start lies on the left side.
+SWELLING = {"table": "stem", "w": {"kind": "fourier", "mean": 1.0, "period": 1.5, "cos": [0.25]}, "h": 1.0}
+SWOLLEN_START = {**DOWN, "t": 0.5, "x": -0.875, "y": -0.5}
 Step = dict[str, Any]
 Change = Callable[[Step], Step]
 
@@ -73,6 +76,12 @@ ROWS: dict[str, tuple[Step, int, str]] = {
     "a start outside": (question({**DOWN, "y": -1.0}, UP), 1, "step 1: open: the state is beyond a wall"),
     "a start without x": (question(without(DOWN, "x"), UP), 2, "a state has t, x, y, vx, vy"),
     "an unknown field": (question(DOWN, UP, tend=0.25), 2, "'tend'] is an unknown field of a path"),
+    "a start that no precision decides": (
+        question(SWOLLEN_START, UP, scene=SWELLING), 1, "step 1: open: whether the state is on wall left",
+    ),
+    "a late clock that stands still": (
+        question({**DOWN, "t": 2.0**30}, {**UP, "t": 2.0**30, "dt": 0.5}), 1, "false: t does not grow",
+    ),
     "a corner": (
         question({**DOWN, "x": 1.0, "y": 0.0, "wall": "base"}, UP), 1, "step 1: open: the motion has no next",
     ),
@@ -220,6 +229,13 @@ def test_the_first_false_step_ends_it_unless_all_are_asked(tmp_path, capsys):
     assert " of 6 agree" in out.splitlines()[-1]
 
 
+def test_a_step_after_one_that_cannot_be_read_is_open(tmp_path, capsys):
+    for unreadable in (5, {"wall": "base"}):
+        text = json.dumps(question(DOWN, unreadable, UP, UP))
+        code, out, _ = judge_text(text, tmp_path, capsys, "--all")
+        assert (code, "step 2: open: the step before cannot be read" in out) == (1, True)
+
+
 def test_the_worst_step_is_named(tmp_path, capsys):
     scene, start, steps = path_of("static", 6)
     wrong = [*steps[:3], {**steps[3], "vx": steps[3]["vx"] * (1 + 1e-12)}]
@@ -267,6 +283,14 @@ TABLES = {
         ("--scene",), "t,x,y,vx,vy,wall\n0,0,.5,0,-1,\n0.5,0,0,0,one,base", 1, "vy = 'one' is no finite",
     ),
 }  # fmt: skip
+
+
+def test_a_table_that_is_no_text_is_told_by_line(tmp_path, capsys):
+    scene, path = tmp_path / "scene.json", tmp_path / "a.csv"
+    scene.write_text(json.dumps(CAP))
+    path.write_bytes(b"t,x,y,vx,vy,wall\n0,0,0.5,0,-1,\n\xff,0,0,0,0,base\n")
+    assert verify.main(["--answers", "--scene", str(scene), str(path)]) == 2
+    assert "a.csv:3: this is no UTF-8" in capsys.readouterr()[1]
 
 
 @pytest.mark.parametrize("row", TABLES.values(), ids=TABLES)

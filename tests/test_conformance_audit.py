@@ -391,6 +391,38 @@ def test_a_number_that_is_off_by_what_a_claim_detects_changes_its_verdict(name):
         assert verdict_of(claim, as_printed) == "confirmed"
 
 
+def statements_of_loops(loops=None, **m1):
+    """Return M12's statements, with other loops or growths for some scenes."""
+    with pytest.MonkeyPatch.context() as patch:
+        made = misprints.volume_loop
+        other = loops or {}
+        patch.setattr(
+            misprints, "volume_loop", lambda table, n: made(load(other.get(table.name, table.name)), n)
+        )
+
+        def predict(scene, digits):
+            right = CACHED(scene, digits)
+            return right._replace(m1=mpmath.mpf(m1.get(scene.name.replace("-", "_"), right.m1)))
+
+        evidence = ClaimEvidence({}, REAL_STEPPERS, predict=predict, threads=1)
+        return {check.what: check.holds for check in misprints.loop_plane(evidence)}
+
+
+def test_each_half_of_a_statement_on_two_numbers_counts():
+    """An area without growth, and growth without an area, are refuted."""
+    no_area = "plane (V_ell/V_cap, V_cap/V): no area, and no growth"
+    area = "plane (V_ell/V_cap, V_cap/V): {} has an area, and growth"
+    moving = area.format("moving-cap")
+    right = statements_of_loops()
+    assert (right[no_area], right[moving]) == (True, True)
+    assert not statements_of_loops({"moving-cap-trivial": "moving-cap"})[no_area]
+    assert not statements_of_loops(moving_cap_trivial=1e-3)[no_area]
+    assert not statements_of_loops(moving_cap_trivial=-1e-3)[no_area]
+    assert not statements_of_loops({"moving-cap": "moving-cap-trivial"})[moving]
+    assert not statements_of_loops(moving_cap=-1e-3)[moving]
+    assert not statements_of_loops(fixed_cap_anticlockwise=0)[area.format("fixed-cap-anticlockwise")]
+
+
 def test_a_comparison_is_left_open_before_it_could_miss_all_of_a_number():
     """With errors as wide as its scale it says nothing: the scale is no larger than what is expected."""
     n_scaled = 0

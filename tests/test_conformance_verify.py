@@ -287,11 +287,11 @@ REQUIREMENTS: dict[str, Row] = {
         CAP, (0.0, 0.0, 0.5, 0.75, 1.0, None), 0.75, 1,
     ),
     "falling: f > 0 at the end": (
-        "(jet.d1.sign < 0 and is_positive_at_end)", "jet.d1.sign < 0",
+        "jet.d1.sign < 0 and is_positive_at_end:", "jet.d1.sign < 0:",
         SPIKE, (0.0, 0.0, -0.5, 0.0, -0.0625, None), 4.1875, 1,
     ),
     "as evaluated: f > 0": (
-        "if jet.f.sign > 0 or", "if jet.f.sign >= 0 or",
+        "if jet.f.sign > 0:", "if jet.f.sign >= 0:",
         SHAKEN, (0.0, 0.0, -0.5, 0.25, -1.0, None), 1.0, 1,
     ),
     "centred: the second order counts": (
@@ -313,6 +313,16 @@ REQUIREMENTS: dict[str, Row] = {
     "a law has knots": (
         "if since < leg.end and leg.begin <= until:", "if leg.begin <= since < leg.end:",
         {**STEM, "h": legs([0.0, 1.0], [1.0, 2.0], [2.0, 1.0])}, (0.0, 0.0, -0.5, 0.0, -0.5, None), 1.875, 1,
+    ),
+    "a wave is rational at quarters of its turn only": (
+        "quarters.denominator == 1 and (scene.period", "(scene.period",
+        {"table": "cap", "r": {"kind": "fourier", "mean": 1.0, "period": 1.5, "cos": [-0.25]}},
+        (0.5, 0.0, 0.75, 1.0, -0.5, None), 9.0, 1,
+    ),
+    "a wave whose period is irrational is rational at time 0 only": (
+        "quarters.denominator == 1 and (scene.period or time == 0)", "True",
+        {"table": "cap", "r": {"kind": "fourier", "mean": 1.0, "omega": 1.0, "cos": [-0.25]}},
+        (1.0, 0.0, 0.75, 1.0, -0.5, None), 9.0, 1,
     ),
     "a scene is valid": (
         "    require_valid(scene)\n", "",
@@ -418,12 +428,20 @@ LINES: dict[str, tuple[str, str, str, list[Any], Any]] = {
         "at-the-horizon/9", ["collisions"], 999_999,
     ),
     "rejected is for what is late": (
-        "LATE, LARGE = 2**30,", "LATE, LARGE = 2**29,", "hard-case-39/2", ["state", "t"], 2.0**29,
+        "LATE = 2**30", "LATE = 2**29", "hard-case-39/2", ["state", "t"], 2.0**29,
     ),
     "numbers round to binary64": (
         "return Fraction(float(value ",
         "return Fraction(float(inf if abs(value) > sys.float_info.max else value ",
         "moving-cap/1", [], {"t_end": 2**1024 - 2**970 - 1, "expect": REJECTED},
+    ),
+    "a line has known fields only": (
+        "    require_known(record)\n", "",
+        "moving-cap/1", [], {"captured": True},
+    ),
+    "a step has known fields only": (
+        'require_form("step", step)', "pass",
+        "moving-cap/1", ["expect", 0, "steps", 0, "t"], ["7", "8"],
     ),
     # Both ways: what a rule permits is listed, once.
     "a refusal of what may be refused is listed": (
@@ -527,3 +545,27 @@ def test_a_requirement_on_lines_is_needed(row: tuple[str, str, str, list[Any], A
         line |= value(line) if callable(value) else value
     assert weaken(piece, other).verify_line(line).status == "proved"
     assert judge(line) != "proved"
+
+
+WIDER = ["0.004", "0.008"]  # holds dt of moving-cap/1
+NARROWNESS: dict[str, tuple[str, str, list[Any]]] = {
+    "digits are asked": ("if digits is not None:", "if False:", []),
+    "all numbers are asked": (
+        "in NUMBERS:\n            low, high = map", "in NUMBERS[1:]:\n            low, high = map", [],
+    ),
+    "the proved answer is asked": ("answer, _ = claim_of(record)", 'answer = record["expect"][0]', REJECTED),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("row", NARROWNESS.values(), ids=NARROWNESS)
+def test_a_requirement_on_widths_is_needed(row: tuple[str, str, list[Any]]) -> None:
+    piece, other, before = row
+    line = plain(next(line for line in lines() if line["id"] == "moving-cap/1"))
+    if before:
+        line |= {"scene": {**line["scene"], "$schema": "x"}}
+    line["expect"] = [*before, *line["expect"]]
+    weak = weaken(piece, other)
+    assert verify.verify_line(line, 17) == weak.verify_line(line, 17) == verify.Verdict("proved")
+    line["expect"][-1]["steps"][0]["dt"] = WIDER
+    assert verify.verify_line(line).status == weak.verify_line(line, 17).status == "proved"
+    assert verify.verify_line(line, 17).status == "not proved"

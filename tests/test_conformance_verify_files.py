@@ -25,11 +25,11 @@ LINE: dict[str, Any] = {
     "expect": [{"outcome": "collision", "steps": [STEP]}],
 }  # fmt: skip
 FALSE = {**LINE, "t_end": 0.25}
-# It is on the left side at an irrational phase, as far as any precision shows, and far below the floor.
-SWELLING = {"kind": "fourier", "mean": 1.0, "period": 2.0, "sin": [0.25]}
+# At a third of a period the cosine is -1/2, which no precision shows: on the left side, and below the floor.
+SWELLING = {"kind": "fourier", "mean": 1.0, "period": 1.5, "cos": [0.25]}
 REFUSED = {
     **LINE, "scene": {"table": "stem", "w": SWELLING, "h": 1.0}, "expect": [{"outcome": "rejected"}],
-    "state": {**DOWN, "t": 0.5, "x": -1.25, "y": -2.0},
+    "state": {**DOWN, "t": 0.5, "x": -0.875, "y": -2.0},
 }  # fmt: skip
 WIDE = {**LINE, "expect": [{"outcome": "collision", "steps": [{**STEP, "dt": ["0.4", "0.6"]}]}]}
 TEXT, TRUE = json.dumps(LINE), "1 of 1 proved"
@@ -192,6 +192,16 @@ def test_the_width_is_that_of_the_larger_end():
     assert verify.verify_line(record, 4).status == "not proved"
     record["expect"][0]["steps"][0]["x"] = ["-1E-300", "1E-300"]
     assert verify.verify_line(record, 1).status == "not proved"
+
+
+def test_the_answer_that_must_be_narrow_is_the_proved_one():
+    """A refusal may stand before it."""
+    late = {**LINE, "state": {**DOWN, "t": 2.0**30}, "t_end": 2.0**30 + 9}
+    for first, second in ((0, 1), (1, 0)):
+        answers = [WIDE["expect"][0], {"outcome": "rejected"}]
+        record = {**late, "expect": [answers[first], answers[second]]}
+        assert verify.verify_line(record).status == "proved"
+        assert verify.verify_line(record, 1).status == "not proved"
 
 
 OPTIONS = {

@@ -269,7 +269,8 @@ def test_each_number_of_a_step_is_compared(name: str) -> None:
 )  # fmt: skip
 def test_a_number_is_two_decimals(ends: Any) -> None:
     found = {"outcome": "collision", "steps": [step("base") | {"dt": ends}]}
-    with pytest.raises(verify.Unreadable, match="dt must be"):
+    words = "dt must be" if isinstance(ends, list) else "a field dt of another type"
+    with pytest.raises(verify.Unreadable, match=words):
         judge(CAP, FALL, found)
 
 
@@ -338,6 +339,7 @@ def test_cosines_are_taken_of_narrow_phases(bits: int) -> None:
 
 HALF_STEM = {**STEM, "w": 0.5}
 WAVY = {**STEM, "w": fourier()}
+SHALLOW = {**MUSHROOM, "w": 0.875, "h": 2.0**-8}
 ROLLING = {**MUSHROOM, "w": 0.75, "h": fourier(sin=[], cos=[0.125])}
 BREATHING = {**CAP, "r": fourier(omega=3.0, sin=[], cos=[0.25])}
 # Scene, state, horizon, bits; how many steps are proved with so few, and what is then open.
@@ -345,6 +347,7 @@ OPEN: list[tuple[dict[str, Any], dict[str, Any], float, int, int, str]] = [
     (HALF_STEM, state(0.31, -0.58, -6.48002, 4.64), 99.0, 18, 0, "two walls are met together"),
     (CAP, state(-0.14, 0.15, 0.049, -0.019), 7.8947, 16, 0, "whether y = 0 is crossed before the horizon"),
     ({**MUSHROOM, "slope": 0.25}, state(-0.05, 0.33, -0.9, -0.66), 99.0, 20, 0, "whether the mouth is open"),
+    (SHALLOW, state(0.949689, 0.030993, -42.9624, -0.7302), 99.0, 12, 0, "a wall is met at the height"),
     (ROLLING, state(-0.57, -0.41, 2.638, 0.82), 0.5, 16, 0, "right: f is too small"),
     (BREATHING, state(0.05, 0.54, -0.037, -0.068), 99.0, 16, 2, "the sign of a divisor is open"),
     (WAVY, state(1.21036, -0.5, -1.0, 0.0, t=1.0), 99.0, 16, 0, "whether the state is on wall right"),
@@ -365,3 +368,22 @@ def test_what_few_bits_leave_open_is_unproved(
     with pytest.raises(verify.Unproved, match=reason):
         next(steps)
     assert len(list(islice(verify.walk(table, given, Fraction(t_end), 256), n + 1))) == n + 1
+
+
+def test_a_search_begins_where_f_is_positive():
+    """Below the floor, on the way up, f rises through 0; that is no hit, and no wall that is never met."""
+    scene = verify.read_scene(STEM, [verify.WORK])
+    below = verify.State(*map(Fraction, (0, 0, -1.25, 0, 1)), None)
+    clock = verify.Clock(scene, below.t, 128)
+    line = [verify.number(number, 128) for number in below[1:5]]
+    flight = verify.Flight(clock, tuple(line), Fraction(9), clock.zero, state=below)
+    with pytest.raises(verify.Unproved, match="positive where the search begins"):
+        flight.first_root("floor", clock.zero, verify.number(Fraction(1, 2), 128))
+
+
+def test_few_bits_do_not_tell_whether_a_start_is_late():
+    scene = verify.read_scene({**CAP, "r": fourier()}, [verify.WORK])
+    start = verify.State(Fraction(2.0**31 * math.pi), *map(Fraction, (0, 0, 0, 0)), None)
+    assert not verify.is_extreme(scene, start, 128)
+    with pytest.raises(verify.Unproved, match="so late"):
+        verify.is_extreme(scene, start, 24)

@@ -37,8 +37,9 @@ from conformance.suite.checks.requests import MOST_SAMPLES
 from conformance.suite.result import MAX_DECLINED_OF_PART, VERDICTS, declines_too_much
 from conformance.suite.session import read_answer
 from docs import figures, pictures
+from fast.kernel.fates import MOST_TO_A_TIME
 from fast.kernel.follow import LANE_ROWS
-from fast.validation import MAX_CYCLES, MOST_IN_CYCLES, MOST_TO_A_TIME
+from fast.validation import MAX_CYCLES, MOST_IN_CYCLES
 from mushrooms.commands import MOST_ON_DISK
 from mushrooms.orbits import MAX_COLLISIONS, MAX_ORBITS
 from mushrooms.simulate import MOST_IN_MEMORY

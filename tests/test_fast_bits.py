@@ -13,7 +13,7 @@ from support.faulty_kernels import value_of
 
 import fast
 from fast import ensemble, paths
-from fast.kernel.follow import PATHS
+from fast.kernel.path import PATHS
 from fast.kernel.worker import LONG, follow_path
 from scene import Cap, State, load
 from scene.transforms import mirrored, mirrored_wall

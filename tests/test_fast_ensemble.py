@@ -14,12 +14,12 @@ from support.depth import deep_among, deep_but
 
 import fast
 import theory
-from fast import ensemble
-from fast.ensemble import initial_states, one_cycle
+from fast import prepared
+from fast.ensemble import initial_states
 from scene import BadInput, BangBang, Fourier, Mushroom, State, load
 from scene.geometry import table_at
 from scene.laws import value
-from scene.mouth import mouth_minima, start_time
+from scene.mouth import mouth_minima, one_cycle, start_time
 from scene.tables import width_factors
 
 
@@ -263,11 +263,12 @@ WRONG = {
 }
 
 
+@pytest.mark.usefixtures("uncached")
 @pytest.mark.parametrize("mutant", WRONG)
 @pytest.mark.parametrize("name", deep_but(["equal", "plateaus"], "equal"))
 def test_other_stays_give_another_p_nc(name, mutant, monkeypatch):
     scene = MOUTHS[name]
-    monkeypatch.setattr(ensemble, "mouth_minima", lambda scene: WRONG[mutant](mouth_minima(scene)))
+    monkeypatch.setattr(prepared, "mouth_minima", lambda scene: WRONG[mutant](mouth_minima(scene)))
     z, error = z_score(fast.simulate(scene, n_particles=N, energy=ENERGY[name], seed=1), scene)
     assert abs(z) > 4 + BIAS[name] / error
 

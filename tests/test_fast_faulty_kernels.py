@@ -14,19 +14,19 @@ FAULTS = {
     "a start that has left its arc is still taken as given": (
         "test_fast_recollisions",
         "share_of_careful_steps('a mushroom', 8, 30.0) > 0.4",
-        *("follow.py", "a[AS_GIVEN + i] = 0.0", "a[AS_GIVEN + i] = 1.0"),
+        *("follow.py", "a[rows.AS_GIVEN + i] = 0.0", "a[rows.AS_GIVEN + i] = 1.0"),
     ),
     "a start off its arc is not taken as given": (
         *ELSEWHERE,
-        *("follow.py", "and a[AS_GIVEN + i] == 0.0", "and a[AS_GIVEN + i] < 2.0"),
+        *("follow.py", "and a[rows.AS_GIVEN + i] == 0.0", "and a[rows.AS_GIVEN + i] < 2.0"),
     ),
     "a start below y = 0 is taken to be on the arc": (
         *ELSEWHERE,
-        *("records.py", "if a[Y + i] < 0.0 and a[WALL + i] == ON_ARC:", "if a[Y + i] < 0.0:"),
+        *("rows.py", "if a[Y + i] < 0.0 and a[WALL + i] == ON_ARC:", "if a[Y + i] < 0.0:"),
     ),
     "a start in the disk is taken to be on the arc": (
         *ELSEWHERE,
-        *("follow.py", "if pool == DISK and a[WALL + i] == ON_ARC:", "if pool == DISK:"),
+        *("follow.py", "if pool == DISK and a[rows.WALL + i] == rows.ON_ARC:", "if pool == DISK:"),
     ),
     "sides are looked for below the floor": (
         "test_fast_horizons",

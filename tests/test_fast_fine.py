@@ -131,4 +131,4 @@ def test_rounding_a_state_of_pairs_is_not_taken_for_a_gap():
     anchors, called_off = np.zeros(ANCHORS_SHAPE), np.zeros(1, np.int64)
     compiled, wall = compile_scene(scene), WALL_CODES[None]
     n, code = fine_path(compiled, anchors, start, wall, steps, met, called_off)
-    assert (n, code) == (0, records.CORNER)
+    assert (n, code) == (0, records.NEAR_CORNER)

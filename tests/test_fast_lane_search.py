@@ -15,7 +15,7 @@ from support.lane_search import GROUPS, Round, search
 import fast
 import reference
 from fast.batch import LaneRound, lane_steps
-from fast.kernel import lanes, records
+from fast.kernel import lanes, rows
 from fast.step import WALL_NAMES
 from scene import Cap, Collision, Mushroom, State
 
@@ -109,26 +109,26 @@ MUTANTS = {
     "what Newton's step leaves": (
         "arc to stem",
         500,
-        "result = LATE if error < s else result",
-        "result = LATE",
+        "result = rows.LATE if error < s else result",
+        "result = rows.LATE",
     ),
     "how long the polynomials hold": (
         "arc to base",
         1000,
-        "return FAR if ahead <= 0.0 else result",
+        "return rows.FAR if ahead <= 0.0 else result",
         "return result",
     ),
     "how long the radius was known before": (
         "base to arc",
         500,
-        "known = known if hit == ON_ARC else 1.0",
+        "known = known if hit == rows.ON_ARC else 1.0",
         "known = 1.0",
     ),
     "what Newton's step leaves of the place": (
         "up a deep stem",
         600,
-        "return NEVER if hit == ON_ARC and error",
-        "return NEVER if hit != hit and error",
+        "return rows.NEVER if hit == rows.ON_ARC and error",
+        "return rows.NEVER if hit != hit and error",
     ),
     "what a bounce hangs on": (
         "slow beside a plateau",
@@ -139,7 +139,7 @@ MUTANTS = {
     "the part of a velocity that a bounce turns": (
         "slow beside a plateau",
         400,
-        "(abs(vy) if hit == ON_FLOOR else abs(vx)) - limits.rate",
+        "(abs(vy) if hit == rows.ON_FLOOR else abs(vx)) - limits.rate",
         "abs(vx) + abs(vy) - limits.rate",
     ),
     "what a moving slope turns": (
@@ -181,8 +181,8 @@ MUTANTS = {
     "the mouth at the end of a chord": (
         "captured beside a moving mouth",
         500,
-        "reach = max(a[SURE + i], there.w)",
-        "reach = a[SURE + i]",
+        "reach = max(a[rows.SURE + i], there.w)",
+        "reach = a[rows.SURE + i]",
     ),
     "the mouth's curvature under a chord": (
         "captured beside a moving mouth",
@@ -206,8 +206,8 @@ MUTANTS = {
     "the slope of the side that is met": (
         "misled side",
         300,
-        "return 1.0 if hit == ON_BASE else first",
-        "return 1.0 if hit != ON_ARC else first",
+        "return 1.0 if hit == rows.ON_BASE else first",
+        "return 1.0 if hit != rows.ON_ARC else first",
     ),
 }
 
@@ -217,7 +217,7 @@ def test_uncompiled_lanes_give_the_bits_of_compiled_ones(group):
     """Mutants run uncompiled; what is not spoilt in them is what users run."""
     random, aim = np.random.default_rng(7), GROUPS[group]
     for _ in range(4):
-        scene, starts = aim.draw(records.LANES, random)
+        scene, starts = aim.draw(rows.LANES, random)
         one, other = (Round(scene, k, is_captured=aim.is_captured) for k in (lanes, faulty_lanes("", "")))
         one.fill_all(starts)
         other.fill_all(starts)
@@ -248,15 +248,15 @@ def count_wrong_walls(draw, kernels, tally):
     """Count the lane answers near corners that name another wall than the one that is proved to be first."""
     random = np.random.default_rng(5)
     for _ in range(8):
-        scene, starts = CORNERS[draw](records.LANES, random)
+        scene, starts = CORNERS[draw](rows.LANES, random)
         pool = Round(scene, kernels)
         pool.fill_all(starts)
-        right, hits, rows = pool.step(len(starts))
+        right, hits, steps = pool.step(len(starts))
         for i in np.flatnonzero(right):
             (t, _, *place), wall = starts[i]
             start = State(float(t), *map(float, place), WALL_NAMES[wall])
             proved = reference.next_collision(scene, start, start.t + 10.0, digits=25)
-            found = "base" if pool.is_disk and rows[i, 2] < 0.0 else WALL_NAMES[int(hits[i])]
+            found = "base" if pool.is_disk and steps[i, 2] < 0.0 else WALL_NAMES[int(hits[i])]
             tally["answered"] += 1
             tally["wrong"] += isinstance(proved, reference.Collision) and proved.wall != found
         if tally["wrong"]:
@@ -286,8 +286,8 @@ ROUNDING = {
     ),
     "the arc on a flight to the base": (
         "the end of the arc",
-        "return inside if hit == ON_BASE else place",
-        "return 1.0 if hit == ON_BASE else place",
+        "return inside if hit == rows.ON_BASE else place",
+        "return 1.0 if hit == rows.ON_BASE else place",
     ),
     "the base inside the arc": (
         "the end of a resting arc",

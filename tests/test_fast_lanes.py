@@ -25,25 +25,16 @@ from conformance.cases.delicate_families import sunk
 from conformance.strategies import scenes
 from fast import pieces
 from fast.ensemble import initial_states
-from fast.kernel import worker
+from fast.kernel import rows, worker
 from fast.kernel.compiling import HOW, TOOLS
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES, fresh_phase, law_at, law_of_waves, piece_at
 from fast.kernel.lanes import chord, fly
-from fast.kernel.records import (
-    DEPTH,
-    LANES,
-    MUSHROOM,
-    N_HARMONICS,
-    OMEGA,
-    POOL_SIZE,
-    SHARED,
-    Compiled,
-    LawLimits,
-)
+from fast.kernel.records import DEPTH, MUSHROOM, N_HARMONICS, OMEGA, SHARED, Compiled, LawLimits
 from fast.kernel.worker import CACHE_LINE, new_pools
 from fast.pieces import PARABOLA, SERIES, laws_in_lanes, waves_of
+from fast.prepared import prepare
 from fast.step import WALL_CODES
-from fast.units import compile_scene, fit
+from fast.units import compile_scene
 from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, load
 from scene.laws import bounds, value
 from scene.tables import width_factors
@@ -97,8 +88,8 @@ def test_the_width_of_registers_changes_no_bit(step):
     """The same loop runs in Python, which has no such registers. Both machine codes must give its bits."""
     limits, waves = LawLimits(*np.ones(8)), NO_WAVES._replace(omega=0.5, r=(1.0, 0.1, 0.2, 0.0, 0.0))
     table = Compiled(int(MUSHROOM), True, np.zeros((5, 5)), np.zeros((4, 4)))
-    given = (LANES, table, waves, 0.125, (0,), limits)
-    drawn = np.random.default_rng(1).uniform(0.5, 2.0, POOL_SIZE)
+    given = (rows.LANES, table, waves, 0.125, (0,), limits)
+    drawn = np.random.default_rng(1).uniform(0.5, 2.0, rows.POOL_SIZE)
     in_python = drawn.tolist()
     with np.errstate(all="ignore"):
         getattr(faulty_lanes(), step.__name__)(in_python, *given)
@@ -181,7 +172,7 @@ def test_lanes_take_the_careful_steps(name, tally):
     """From collisions of paths on: the search of test_fast_lane_search.py, in scenes that people ask for."""
     scene, random = SCENES[name], np.random.default_rng(3)
     for t, _, *place in initial_states(scene, N_PATHS, 1e5, 3).tolist():
-        path = fast.trajectory(scene, State(t, *place), LANES)
+        path = fast.trajectory(scene, State(t, *place), rows.LANES)
         starts = [
             (np.array([t, 0.0, *place]), WALL_CODES[wall])
             for wall, (_, t, *place) in zip(path.walls, path.steps.tolist(), strict=True)
@@ -202,7 +193,7 @@ def test_pools_begin_with_a_cache_line_wherever_memory_lies():
         held.append(pools)
         assert pools.ctypes.data % CACHE_LINE == 0
         assert pools.flags.c_contiguous
-        assert pools.shape == (2, POOL_SIZE)
+        assert pools.shape == (2, rows.POOL_SIZE)
 
 
 ROUNDING = 8 * 2.0**-53
@@ -222,7 +213,7 @@ def worst_errors(scene, random, n):
     """Return how far polynomials are from laws: value over its size, rate and mean rate over their terms."""
     compiled, worst = compile_scene(scene), np.zeros(3)
     degree = (0,) * (SERIES if compiled.laws[SHARED, OMEGA] > 0.0 else PARABOLA)
-    p = pieces.pieces_of(scene, len(degree))
+    p = pieces.pieces_of(scene, compiled, len(degree))
     for t in random.uniform(-7 * p.period, 7 * p.period, n):
         piece, reference, low = from_python(piece_at)(p, t, 0.0)
         near, far = np.sort(random.choice([-1.0, 1.0, *random.uniform(-1, 1, 2)], 2)) * p.limits[piece]
@@ -252,7 +243,7 @@ def terms_of_rate(law):
 @settings(max_examples=15)
 def test_polynomials_are_the_laws_within_rounding(scene, seed):
     assume(scene.period)  # where nothing moves, lanes take no polynomials
-    scene = fit(scene).scene
+    scene = prepare(scene).scene
     assert (worst_errors(scene, np.random.default_rng(seed), 4) <= ROUNDING).all()
 
 
@@ -299,12 +290,17 @@ def test_pieces_of_waves_that_are_rounded_where_they_cancel_are_seen(scene, monk
     assert worst_errors(scene, np.random.default_rng(1), 40)[0] > 100 * 2.0**-53
 
 
+def in_lanes(scene):
+    """Return a scene, in its own units, as the lanes know it."""
+    return laws_in_lanes(scene, compile_scene(scene))
+
+
 def test_degrees_are_no_higher_than_it_takes():
     """Sizes that come down far are no waves, nor are more than two harmonics, or knots."""
     caps = [Cap(r=Fourier(1.0, 1.0, cos)) for cos in ((0.74,), (0.1, 0.1), (0.76,), (0.1, 0.1, 0.1))]
-    found = [laws_in_lanes(scene).degree for scene in [*caps, *DEEP]]
+    found = [in_lanes(scene).form for scene in [*caps, *DEEP]]
     assert found == [ONE_WAVE, TWO_WAVES, SERIES, SERIES, *[SERIES] * 4, PARABOLA]
-    assert len(laws_in_lanes(Cap(r=Fourier(1.0, 1.0, (0.8,)))).pieces.begins) >= 27
+    assert len(in_lanes(Cap(r=Fourier(1.0, 1.0, (0.8,)))).pieces.begins) >= 27
 
 
 def test_lanes_know_no_phase_that_the_careful_step_calls_lost():
@@ -312,7 +308,7 @@ def test_lanes_know_no_phase_that_the_careful_step_calls_lost():
     for scene in DEEP[:4]:
         compiled = compile_scene(scene)
         n, omega = compiled.laws[SHARED, N_HARMONICS], compiled.laws[SHARED, OMEGA]
-        assert 2.0**20 < omega * laws_in_lanes(scene).pieces.until < math.pi / 2 * 2.0**27 / n
+        assert 2.0**20 < omega * in_lanes(scene).pieces.until < math.pi / 2 * 2.0**27 / n
 
 
 WAVING = Mushroom(

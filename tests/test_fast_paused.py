@@ -8,10 +8,9 @@ from msgspec.structs import replace
 
 import fast
 from fast import ensemble, pieces
-from fast.ensemble import one_cycle
 from fast.kernel import follow
 from fast.kernel.arithmetic import MAX_QUADRANT
-from fast.units import fit
+from fast.prepared import prepare
 from scene import BadInput, BangBang, Cap, Fourier, Mushroom, load
 
 TWICE = tuple(zip(map(float, range(9)), (1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0), strict=True))
@@ -102,16 +101,16 @@ def test_who_cannot_go_on_is_followed_from_the_start(monkeypatch):
     tied = one._replace(lanes=one.lanes.copy())
     is_right = tied.lanes[:, follow.IS_KNOWN] > 0
     assert is_right.any()
-    tied.lanes[is_right, follow.FIRST_ROW] -= 0.25 * one_cycle(fit(scene).scene)
+    tied.lanes[is_right, follow.FIRST_ROW] -= 0.25 * prepare(scene).cycle
     assert is_same(fast.go_on(scene, n_cycles=3, before=tied, **asked), three)
-    monkeypatch.setattr(ensemble.records, "ANEW", 99)  # nobody is followed anew
+    monkeypatch.setattr(ensemble.records, "FOLLOW_ANEW", 99)  # nobody is followed anew
     found = fast.go_on(scene, n_cycles=3, before=tied, **asked)
     assert found.ensemble.sha256() != three.ensemble.sha256()
 
 
 def test_no_number_of_a_lane_may_be_forgotten(monkeypatch):
     """Each is needed in some run. A last state, which has six of them, is thus not enough to go on from."""
-    monkeypatch.setattr(ensemble.records, "ANEW", 99)  # nobody is followed anew
+    monkeypatch.setattr(ensemble.records, "FOLLOW_ANEW", 99)  # nobody is followed anew
     missed = set(range(follow.LANE_ROWS))
     for name in ("many harmonics", "fixed cap", "a cap alone"):
         scene, asked = SCENES[name], {"n_particles": 100, "energy": 3.0, "seed": 8, "phases": (0.3, 0.8)}

@@ -30,7 +30,8 @@ from fast import pieces, step as stepper, units
 from fast.batch import lane_steps
 from fast.kernel import arithmetic, records
 from fast.kernel.records import BAD_QUESTION
-from fast.units import fit
+from fast.prepared import prepare
+from fast.units import compile_scene
 from scene import (
     BadInput,
     BangBang,
@@ -257,7 +258,7 @@ Question = tuple[Scene, State, float]
 def by_a_path(scene: Scene, state: State, t_end: float) -> Outcome | None:
     """Answer as `next_collision`, with checks in Python and the careful step of trajectories."""
     try:
-        fit(scene)
+        prepare(scene)
         check_numbers(scene, state, t_end)
         path = fast.trajectory(scene, state, 1, t_end)
     except BadInput as error:
@@ -417,7 +418,7 @@ def test_what_samples_do_not_show_to_be_positive_is_told_to_be_0():
     touching = Fourier(mean=1.0, omega=1.0, cos=(1.0 - 2.0**-53,))
     assert bounds(touching).lowest < size_bounds(touching).lowest == 0.0
     scene = Cap(r=touching)
-    assert pieces.pieces_of(scene, pieces.SERIES) is None  # lanes know nothing of it
+    assert pieces.pieces_of(scene, compile_scene(scene), pieces.SERIES) is None  # lanes know nothing of it
     start = State(0.0, 0.5, 0.5, 30.0, 40.0)
     path, flow = fast.trajectory(scene, start, 100, 0.5), fast.flow(scene, [start], 0.5)
     end, arrived = path.outcome, flow.outcomes[0]

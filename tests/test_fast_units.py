@@ -16,7 +16,8 @@ import fast
 from conformance.strategies import scenes_and_states
 from fast import step as stepper
 from fast.kernel.single import pack_scene
-from fast.units import Fitted, compile_scene, outward
+from fast.prepared import Prepared
+from fast.units import compile_scene, outward
 from scene import BangBang, Cap, Collision, Fourier, Horizon, Mushroom, Rejected, State, Undecided, load
 from scene.refusal import BadInput
 from scene.transforms import scaled, scaled_state
@@ -89,10 +90,10 @@ def test_the_search_sees_a_stepper_that_does_not_scale(monkeypatch, tally):
 
     def unfitted(scene):
         compiled = compile_scene(scene)
-        return Fitted(scene, 0, 0, compiled, pack_scene(compiled, 0, 0))
+        return Prepared(scene, scene, 0, 0, compiled, pack_scene(compiled, 0, 0))
 
-    monkeypatch.setattr(stepper, "fit", unfitted)
-    monkeypatch.setattr(import_module("fast.paths"), "fit", unfitted)
+    monkeypatch.setattr(stepper, "prepare", unfitted)
+    monkeypatch.setattr(import_module("fast.paths"), "prepare", unfitted)
     with np.errstate(all="ignore"), pytest.raises(AssertionError):
         search_scalings(tally)
 

@@ -12,7 +12,7 @@ from support.entries import kept_entries
 
 import fast
 from conformance.audit import session
-from fast.kernel import fine_step, follow, scalar_step, worker
+from fast.kernel import fine_step, follow, path, scalar_step, worker
 from mushrooms import bench, orbits, output, questions
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled without the compiler")
@@ -61,7 +61,7 @@ def test_each_kernel_that_takes_long_is_announced_and_no_other(capsys):
 
 
 def test_what_is_compiled_together_is_announced_once(capsys):
-    loops = [*worker.FLIES.values(), *worker.CHORDS.values(), *follow.PATHS.values()]
+    loops = [*worker.FLIES.values(), *worker.CHORDS.values(), *path.PATHS.values()]
     with output.announce_compilation():
         compile_again(scalar_step.scalar_step, *loops, follow.follow_particles, fine_step.fine_path)
     assert capsys.readouterr().err == SLOW + FINE

@@ -252,7 +252,7 @@ def test_exponents_are_those_of_the_stretches_with_their_errors(monkeypatch):
 def test_an_animation_shows_the_particle_where_it_is(moving, monkeypatch):
     shown = []
 
-    def look(scene, axes, times, show, _file):
+    def look(scene, axes, times, show, _file, _progress):
         for k in range(len(times)):
             show(k)
             trail, dot = axes.lines[-2:]

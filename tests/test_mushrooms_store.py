@@ -21,7 +21,7 @@ from zarr.storage import LocalStore
 import fast
 import mushrooms
 from conformance.files import sealed, unsealed
-from fast.kernel import follow as kernel, records
+from fast.kernel import follow as kernel, rows
 from mushrooms import simulate
 from mushrooms.main import run
 from mushrooms.output import LOCK, locked
@@ -465,7 +465,7 @@ def with_other_numbers(scene, **options):
 
 
 def forgotten(row):
-    column = kernel.FIRST_ROW + int(row // records.STRIDE)
+    column = kernel.FIRST_ROW + int(row // rows.STRIDE)
 
     def faulty(arrays, *more):
         lanes = arrays[LANES].copy()
@@ -485,7 +485,7 @@ def of_others(arrays, *more):
         (fast, "go_on", with_other_numbers),
         *(
             (stored, "paused_of", faulty)
-            for faulty in (forgotten(records.VX), forgotten(records.PHASE_SINE), of_others)
+            for faulty in (forgotten(rows.VX), forgotten(rows.PHASE_SINE), of_others)
         ),
     ],
 )

@@ -11,10 +11,12 @@ import os
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
-from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,10 +28,11 @@ import fast
 import mushrooms
 import scene as scenes
 import theory
+from conformance.cases.draw import wire_form
 from mushrooms import bench, draw, main, orbits, output, questions, scenes as listing, simulate
 from mushrooms.figures import energies, orbits as pictures, style, table
-from mushrooms.reports import bench_page
-from mushrooms.store import conduct, run as stored, spec, summary
+from mushrooms.reports import bench_page, check_page
+from mushrooms.store import conduct, export as exports, run as stored, spec, summary
 from mushrooms.store.run import BlockRange
 from mushrooms.store.spec import LANES, RunSpec, shape_of
 from mushrooms.store.summary import careful_note, gain_of, tally_of
@@ -42,17 +45,18 @@ STEM = load("fermi-ulam")
 
 
 def ended(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, error: BaseException
-) -> tuple[object, str]:
-    """Return the exit code and the words of a command that ends in an error."""
+    monkeypatch: pytest.MonkeyPatch, command_line: Callable[..., Any], work: Callable[[], object]
+) -> tuple[object, str, str]:
+    """Return the exit code of a command that does some work, and what it prints."""
+    monkeypatch.setattr(listing, "print_scenes", lambda *_: work())
+    return command_line("scenes")
 
-    def fail(*_: object) -> None:
+
+def failing(error: BaseException) -> Callable[[], object]:
+    def fail() -> None:
         raise error
 
-    monkeypatch.setattr(main, "_refuse_empty", fail)
-    with pytest.raises(SystemExit) as stop:
-        main.run(["scenes"])
-    return stop.value.code, capsys.readouterr().err
+    return fail
 
 
 def caused(error: Exception, cause: BaseException, how: str) -> Exception:
@@ -80,73 +84,84 @@ FULL = errno.ENOSPC, os.strerror(errno.ENOSPC)
         (caused(SystemError("it failed"), KeyboardInterrupt(), "__context__"), 130, "interrupted"),
     ],
 )
-def test_every_end_has_its_code_and_its_words(capsys, monkeypatch, error, code, words):
+def test_every_end_has_its_code_and_its_words(monkeypatch, command_line, error, code, words):
     said = f"mushrooms: {words}\n" if words else ""
-    assert ended(capsys, monkeypatch, error) == (code, said)
+    assert ended(monkeypatch, command_line, failing(error)) == (code, "", said)
 
 
 @pytest.mark.parametrize("error", [ImportError("no module"), SystemError("bad"), ValueError("ours")])
-def test_a_mistake_of_ours_is_no_line(monkeypatch, error):
-    def fail(*_: object) -> None:
-        raise error
-
-    monkeypatch.setattr(main, "_refuse_empty", fail)
-    with pytest.raises(type(error)):
-        main.run(["scenes"])
+def test_a_mistake_of_ours_is_no_line(monkeypatch, command_line, error):
+    with pytest.raises(type(error), match=str(error)):
+        ended(monkeypatch, command_line, failing(error))
 
 
-def test_notes_of_an_error_are_told_in_its_line(capsys, monkeypatch):
+def test_notes_of_an_error_are_told_in_its_line(monkeypatch, command_line):
     error = KeyboardInterrupt()
     error.add_note("half of it\nis kept")
-    assert ended(capsys, monkeypatch, error) == (130, "mushrooms: interrupted; half of it is kept\n")
+    said = "mushrooms: interrupted; half of it is kept\n"
+    assert ended(monkeypatch, command_line, failing(error)) == (130, "", said)
 
 
-def test_a_signal_that_is_ignored_stays_ignored():
-    """`nohup` ignores the terminal that closes; others end as if by the keyboard."""
-    before = {name: signal.getsignal(name) for name in (signal.SIGTERM, signal.SIGHUP)}
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize(("is_ignored", "code"), [(True, 0), (False, 130)])
+def test_a_signal_that_is_ignored_stays_ignored(monkeypatch, command_line, name, is_ignored, code):
+    """`nohup` ignores the terminal that closes; others end as by the keyboard. Then all is as before."""
+    number = getattr(signal, name)
+    usual = signal.default_int_handler if name == "SIGINT" else signal.SIG_DFL
+    before = signal.signal(number, signal.SIG_IGN if is_ignored else usual)
+    heard = signal.getsignal(number)
     try:
-        signal.signal(signal.SIGHUP, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        main._end_as_by_keyboard()
-        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-        assert signal.getsignal(signal.SIGTERM) is signal.default_int_handler
+        ends = ended(monkeypatch, command_line, lambda: (os.kill(os.getpid(), number), time.sleep(0.01)))
+        assert ends == (code, "", "mushrooms: interrupted\n" if code else "")
+        assert signal.getsignal(number) is heard
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        signal.signal(number, before)
 
 
 def test_closed_streams_take_everything(monkeypatch):
     for name in ("stdin", "stdout", "stderr"):
         monkeypatch.setattr(sys, name, None)
-    main._make_printable()
-    assert sys.stdin.read() == ""
-    for stream in (sys.stdout, sys.stderr):
-        print("lost \ud800", file=stream) if stream.errors != "strict" else print("lost", file=stream)
+    read = []
+
+    def work(*_: object) -> None:
+        read.append(sys.stdin.read())
+        print("lost \ud800")
+        print("lost \ud800", file=sys.stderr)
+
+    monkeypatch.setattr(listing, "print_scenes", work)
+    with pytest.raises(SystemExit) as stop:
+        main.run(["scenes"])
+    assert (stop.value.code, read) == (0, [""])
+    for stream in (sys.stdin, sys.stdout, sys.stderr):
         stream.close()
-    sys.stdin.close()
 
 
 def test_a_letter_that_the_encoding_lacks_is_printed_by_its_number(monkeypatch):
+    """A byte of a path that is no letter is printed as it is."""
     inner = io.BytesIO()
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(inner, encoding="ascii"))
-    main._make_printable()
-    print("\u03bd", flush=True)
-    assert inner.getvalue() == b"\\u03bd\n"
+    monkeypatch.setattr(listing, "print_scenes", lambda *_: print("a\u03bd\u03bdb \udc80\udcff"))
+    with pytest.raises(SystemExit):
+        main.run(["scenes"])
+    assert inner.getvalue() == b"a\\u03bd\\u03bdb \x80\xff\n"
 
 
-def test_a_stream_that_fails_is_let_go(tmp_path):
+def test_a_stream_that_fails_is_let_go(monkeypatch, tmp_path):
     """What cannot be flushed any more must not be tried again by the interpreter."""
-    main._let_go(io.StringIO())
     reader, writer = os.pipe()
-    stream = os.fdopen(writer, "w")
-    stream.write("x")
+    monkeypatch.setattr(sys, "stdout", os.fdopen(writer, "w"))
+    monkeypatch.setattr(sys, "stderr", (tmp_path / "closed").open("w"))
     os.close(reader)
-    with suppress(BrokenPipeError):
-        main._let_go(stream)
-    stream.close()  # now it goes to the null device
-    with (tmp_path / "a").open("w") as closed:
-        pass
-    main._let_go(closed)
+
+    def work(*_: object) -> None:
+        print("x")
+        sys.stderr.close()
+
+    monkeypatch.setattr(listing, "print_scenes", work)
+    with pytest.raises(SystemExit) as stop:
+        main.run(["scenes"])
+    assert stop.value.code == 1
+    sys.stdout.close()  # now it goes to the null device
 
 
 def test_the_version_of_a_tree_that_was_never_installed(monkeypatch):
@@ -242,7 +257,7 @@ def test_a_stored_run_is_the_one_at_once(reopened):
 def test_an_export_has_every_result_and_nothing_internal(reopened, tmp_path, capsys):
     files = [tmp_path / f"a.{kind}" for kind in ("csv", "parquet", "npz")]
     for file in files:
-        stored.export_run(reopened.folder, file)
+        exports.export_run(reopened.folder, file)
     assert capsys.readouterr().out.split() == list(map(str, files))
     wanted = [
         "particle", *(f"cycle_energies_{k}" for k in (1, 2)), "t", "x", "y", "vx", "vy",
@@ -258,7 +273,7 @@ def test_an_export_has_every_result_and_nothing_internal(reopened, tmp_path, cap
     assert columns["t_in_2_1"].to_numpy() == pytest.approx(whole.t_in[:, 1, 0], nan_ok=True)
     assert columns["phase_energies_2_1"].to_numpy() == pytest.approx(whole.phase_energies[:, 1, 0])
     with np.load(files[2]) as held:
-        assert set(held.files) == set(fast.Ensemble._fields) - {"seconds", "threads"}
+        assert set(held.files) == {"about"} | set(fast.Ensemble._fields) - {"seconds", "threads"}
     assert LANES not in " ".join(wanted)
 
 
@@ -339,7 +354,9 @@ def test_limits_stop_a_run_between_blocks(tmp_path, monkeypatch):
 def test_blocks_take_seconds_of_what_is_to_be_expected(monkeypatch):
     """A power of two between the least and the most, so that a block makes some 2e8 collisions."""
     one = RunSpec(STEM, 40.0, 1, 7)
-    for each, wanted in ((1e4, 16384), (1e9, 256), (1.0, 2**17), (math.nan, 256), (math.inf, 256)):
+    for each, wanted in (
+        (1e4, 16384), (1e9, 256), (1.0, 2**17), (0.0, 2**17), (math.nan, 256), (math.inf, 256),
+    ):  # fmt: skip
         monkeypatch.setattr(conduct, "expected_collisions", lambda *_, each=each: each)
         monkeypatch.setattr(conduct, "BLOCK_BYTES", 2**40)
         assert conduct.block_size(one, 1) == wanted
@@ -347,6 +364,8 @@ def test_blocks_take_seconds_of_what_is_to_be_expected(monkeypatch):
     monkeypatch.setattr(conduct, "BLOCK_BYTES", 3000 * shape_of(one, 1, 1).bytes_of_a_particle)
     monkeypatch.setattr(conduct, "expected_collisions", lambda *_: 1.0)
     assert conduct.block_size(one, 1) == 2048
+    monkeypatch.setattr(conduct, "BLOCK_BYTES", 1)  # less than one particle needs
+    assert conduct.block_size(one, 1) == 1
     monkeypatch.setattr(conduct, "BLOCK_BYTES", 2**40)
     assert [conduct.block_of_new(one, n, 1) for n in (1, 4096, 4097, 10**9)] == [4096, 4096, 8192, 2**17]
     with pytest.raises(BadInput, match=r"--block = 2: 2000001 particles need blocks of at least 3"):
@@ -397,17 +416,25 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[tuple[object, ...]]:
     """Return the list of what is followed and drawn; nothing is."""
     log: list[tuple[object, ...]] = []
 
-    def follow(scene, n_collisions, **options):
+    def follow(scene, n_collisions, *, progress, **options):
+        progress(0)
         log.append(("follow", scene.name, n_collisions, options))
-        return ["an orbit", "another"]
+        return ["an orbit", "another"][: options["n_orbits"]]
 
     monkeypatch.setattr(orbits, "follow", follow)
     for name in ("trajectory", "energy_in_time", "section", "collision_map"):
         monkeypatch.setattr(pictures, name, lambda *given, name=name: log.append((name, *given)) or name)
-    monkeypatch.setattr(pictures, "write_animation", lambda *given: log.append(("animation", given[0])))
-    monkeypatch.setattr(
-        table, "write_picture", lambda scene, suffix, _: log.append(("walls", scene.name, suffix))
-    )
+
+    def write_animation(orbit, _, *, progress):
+        progress(1, 2)
+        log.append(("animation", orbit))
+
+    def write_picture(scene, suffix, _, progress):
+        progress(1, 2)
+        log.append(("walls", scene.name, suffix))
+
+    monkeypatch.setattr(pictures, "write_animation", write_animation)
+    monkeypatch.setattr(table, "write_picture", write_picture)
     monkeypatch.setattr(style, "save", lambda figure, _, suffix: log.append(("save", figure, suffix)))
     return log
 
@@ -518,6 +545,34 @@ def test_a_duration_has_the_unit_that_suits_it(seconds, text):
     assert output.format_duration(seconds) == text
 
 
+class Terminal(io.StringIO):
+    """A stream that is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_progress_goes_to_standard_error_as_a_bar_or_as_lines(capsys, monkeypatch, is_terminal):
+    """Also while the clock stands still: then the time that is left is unknown."""
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setattr(output, "CLOCK", lambda: 7.0)
+    monkeypatch.setattr(output, "FIRST", 0.0)
+    monkeypatch.setattr(output, "EVERY", 0.0)
+    told = Terminal() if is_terminal else io.StringIO()
+    monkeypatch.setattr(sys, "stderr", told)
+    with output.progress_bar() as bar:
+        watch = output.Watch(bar, "run", "particles")
+        watch.update(1000, 2000)
+        watch.update(1500, 2000)
+    lines = told.getvalue()
+    assert capsys.readouterr().out == ""
+    assert ("run: 1,000 of 2,000 particles, time left unknown" in lines) is not is_terminal
+    assert ("run: 1,500 of 2,000 particles, " in lines) is not is_terminal
+    assert ("1500/2000" in lines) is is_terminal
+
+
 def test_pairs_are_lines_with_their_meanings(capsys):
     pairs = {"a": 0.123456, "a_se": 0.0123, "a_theory": 0.1299999, "long": None, "n": 12}
     output.print_pairs(pairs, False, {"a": "what it is"})
@@ -621,28 +676,33 @@ def test_solvers_that_cannot_run_are_told_of_and_a_command_is_one_of_them(monkey
             bench._solvers(stack, ["broken"])
 
 
-def test_a_picture_of_a_step_begins_where_the_step_does(monkeypatch):
-    from mushrooms.reports import check_page
+FIELDS = ("t", "x", "y", "vx", "vy", "wall")
 
+
+@pytest.mark.parametrize("n_false", [1, 2])
+def test_a_picture_is_of_the_first_false_step_from_where_it_begins(
+    command_line, tmp_path, monkeypatch, n_false
+):
+    """Each later one is false, too: it begins where the false one ends."""
     asked = []
     monkeypatch.setattr(check_page, "draw_step", lambda *given: asked.append(given) or b"svg")
     scene, start = load("moving-cap"), scenes.State(0.0, 0.1, 0.2, 3.0, 4.0)
-    first = fast.next_collision(scene, start, 100.0)
-    second = fast.next_collision(scene, first.state(), 100.0)
-    as_data = [
-        {name: getattr(one, name) for name in ("t", "x", "y", "vx", "vy", "wall")}
-        for one in (start, first, second)
-    ]
-    wire = {k: v for k, v in scenes.to_data(scene).items() if k not in ("name", "notes")}
-    data = {"scene": wire, "state": as_data[0], "steps": as_data[1:]}
-    for at, (begin, end) in enumerate(((start, first), (first.state(), second))):
-        assert questions._draw(data, at) == b"svg"
-        _, state, truth, given = asked[-1][:4]
-        assert (state.x, state.vy, state.wall) == (begin.x, begin.vy, begin.wall)
-        assert (truth.wall, truth.x) == (end.wall, pytest.approx(end.x))
-        assert given == as_data[1 + at]
-    rest = {**data, "state": {**as_data[0], "x": 0.0, "y": 5.0}}
-    assert "--picture: step 1 from" in one_line(questions._draw, rest, 0)
+    path = [start]
+    for _ in range(3):
+        path.append(fast.next_collision(scene, path[-1], 100.0).state())
+    states = [{name: getattr(one, name) for name in FIELDS} for one in path]
+    states[n_false]["x"] += 0.01
+    file, picture = tmp_path / "a.json", tmp_path / "a.svg"
+    head = {"scene": wire_form(scene), "state": states[0], "steps": states[1:]}
+    file.write_text(json.dumps(head))
+    ended = command_line("verify", file, "--picture", picture)
+    assert (ended.code, picture.read_text()) == (1, "svg")
+    assert f"Picture of step {n_false}: {picture}" in ended.out
+    [(drawn, begin, truth, given, place)] = asked
+    assert scenes.to_data(drawn)["r"] == scenes.to_data(scene)["r"]
+    assert [getattr(begin, name) for name in FIELDS] == [states[n_false - 1][name] for name in FIELDS]
+    assert (truth.wall, truth.x) == (path[n_false].wall, pytest.approx(path[n_false].x))
+    assert (given, place) == (states[n_false], f"step {n_false}")
 
 
 def test_hits_are_counted_where_a_flow_is_decided(monkeypatch):

@@ -181,7 +181,7 @@ def test_intervals_enclose_points(law, t, width):
         (lambda: BangBang(((0.0, 1.0), (0.0, 1.0))), "bang-bang.knots[1] time = 0.0, must be > 0.0"),
         (lambda: BangBang(((0.0, 1.0), (1.0, 2.0))), "knots[1] value = 2.0, must equal the first (1.0)"),
         (lambda: BangBang(((0.0, 1.0), (math.inf, 1.0))), "bang-bang.knots[1] time = inf, must be finite"),
-        (lambda: BangBang(((0.0, 1.0), (1.0,))), "knots[1] = an object of type tuple, must be a pair"),
+        (lambda: BangBang(((0.0, 1.0), (1.0,))), "knots[1] = (1.0,), must be a pair"),
         (lambda: BangBang(((0.0, 1.0), "ab")), "bang-bang.knots[1] = 'ab', must be a pair [time, value]"),
         (lambda: BangBang(((1e-20, 1.0), (1.0, 1.0))), "the period must be a binary64 number"),
         (lambda: BangBang(((-1e308, 1.0), (1e308, 1.0))), "the period must be a binary64 number"),

@@ -20,9 +20,9 @@ from fast.kernel.compiling import kept, kernel
 from fast.kernel.laws import leg_at, set_anchors
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, ARC, BANG_BANG, BASE, BEYOND, DEPTH, FAR_TIME, FLOOR, HORIZON, KIND, KNOTS, LEVEL,
-    NO_WALL, N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, PHASE, PHASE_ERROR, RADIUS, RIGHT,
-    SHARED, SLOPE, TANGENT, WIDTH, Particle,
+    AMPLITUDES, ARC, BANG_BANG, BASE, BEYOND_ARC, DEPTH, FLOOR, KIND, KNOTS, LEVEL,
+    NEAR_TANGENCY, NO_WALL, N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, PHASE,
+    PHASE_ERROR, RADIUS, RIGHT, SHARED, SLOPE, TOO_LATE, WIDTH, Particle, is_hit,
 )  # fmt: skip
 from fast.kernel.scalar_step import first_event
 from fast.kernel.walls import crossed_wall
@@ -234,11 +234,11 @@ def rounded(state, wall):
 def fine_step(wall, state, scene, anchors):
     """Return (code, flight time, state after) from a state on `wall`; the anchors hold the laws at it."""
     code, s = first_event(rounded(state, wall), np.inf, scene, anchors)
-    if code >= HORIZON:
+    if not is_hit(code):
         return code, (s, 0.0), state
     time, is_settled = corrected(code, s, code == wall, state, scene)
     if not is_settled:
-        return TANGENT, (s, 0.0), state
+        return NEAR_TANGENCY, (s, 0.0), state
     t, x, y, vx, vy = moved(state, time)
     if code == BASE:
         y = ZERO
@@ -256,14 +256,14 @@ def fine_path(scene, anchors, state, wall, out, met, called_off):
         if called_off[0] != 0:
             return i, wall
         if not set_anchors(scene.laws, anchors, state.t[0], state.t[1]):
-            return i, FAR_TIME
+            return i, TOO_LATE
         if state.t[1] != 0.0 or state.x[1] != 0.0 or state.y[1] != 0.0:
             anchors[PHASE, PHASE_ERROR] = max(anchors[PHASE, PHASE_ERROR], ROUNDED)
         crossed = crossed_wall(rounded(state, wall), scene, anchors) if i == 0 else NO_WALL
         if crossed != NO_WALL:
-            return i, BEYOND + crossed
+            return i, BEYOND_ARC + crossed
         wall, time, state = fine_step(wall, state, scene, anchors)
-        if wall >= HORIZON:
+        if not is_hit(wall):
             return i, wall
         met[i] = wall
         for k, pair in enumerate((time, state.t, state.x, state.y, state.vx, state.vy)):

@@ -1,9 +1,9 @@
 """Following particles: lanes where they are shown right, the scalar step elsewhere.
 
-Many particles are followed to given times (`follow_particles`), one from collision to collision (`PATHS`). A
-worker holds LANES particles in two pools: `general` for any collision, and `disk` for captured particles,
-whose base bounces are counted and not stepped; a cap has the disk alone. Every particle's numbers depend on
-that particle only, so threads, chunks and lane positions do not change a bit.
+Many particles are followed to given times (`follow_particles`). One particle from collision to collision is
+the subject of fast.kernel.path. A worker holds LANES particles in two pools: `general` for any collision, and
+`disk` for captured particles, whose base bounces are counted and not stepped; a cap has the disk alone. Every
+particle's numbers depend on that particle only, so threads, chunks and lane positions do not change a bit.
 
 Particles are looked at where their flight passes a *stop*: an instant at which the energy is wanted, a cycle
 ends or nu has a local minimum. A capture interval is recorded in the slot of each minimum that it spans,
@@ -20,32 +20,25 @@ flight that ran out of its piece was given another in mid-flight.
 
 import numpy as np
 
+from fast.kernel import rows
 from fast.kernel.arithmetic import dot, fma
-from fast.kernel.compiling import HOW, kept, kernel, packed, part
+from fast.kernel.compiling import HOW, kept, kernel, part
+from fast.kernel.lane_laws import know_laws, set_piece, set_reference
+from fast.kernel.lanes import count_hit, stay_after
 
-from fast.kernel.lane_laws import (  # isort: skip
-    ONE_WAVE, TWO_WAVES, know_laws, laws_in, look_ahead, set_piece, set_reference,
-)  # fmt: skip
-from fast.kernel.lanes import (  # isort: skip
-    ONE, arc_quotient, count_hit, cube_of_arc, land, mouth_crossing, nearest_below, outset_of, side_bend,
-    side_curvature, stay_after,
-)  # fmt: skip
 from fast.kernel.records import (  # isort: skip
-    ANEW, ANSWER_LOST, ARC, AS_GIVEN, CAP, CAPTURED, CLEARLY, COARSE, END, FAR, FATE, HIT, HORIZON, LANES,
-    LATE, LAWS, MARKED, MAX_CORRECTIONS, MOVED, MUSHROOM, NEVER, NOT_YET, N_ARC, N_BASE, N_FLOOR, N_LEFT,
-    N_RIGHT, N_ROWS, N_WALLS, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, OVER, PIECE, POOL_SIZE, R0, R1,
-    RADIUS, REF, S, SINCE, SPIN, STAY, STAY_IN, STAY_OUT, STEM, STOP, STRIDE, SURE, T, TOO_FAR, TRIES,
-    T_LOW, UNTIL, VALUE, VX, VY, W0_LOW, WALL, WHEN, WIDTH, X, Y, Particle, copy_rows, load, particle_at,
-    particle_of, put_particle, refold, whole_registers, write_state, write_step,
+    ARC, CAP, FOLLOW_ANEW, HORIZON, MUSHROOM, N_WALLS, RADIUS, TOO_FAR, VALUE, WIDTH, Particle,
+    is_hit, is_lost, particle_at, write_state,
 )  # fmt: skip
-from fast.kernel.scalar_step import KNOWN, NEAR
-from fast.kernel.worker import DISK, FORMS, GENERAL, NEXT_STOP, PARTICLE, run_careful, run_step
+from fast.kernel.rows import copy_rows, load, particle_of, put_particle, refold, whole_registers
+from fast.kernel.scalar_step import KNOWN
+from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE, run_careful, run_step
 
 # Columns of what is kept: the pool, the number of the next stop, scalar steps so far, whether the lanes know
 # the laws; then the rows of the pool up to W0_LOW.
 POOL, NEXT, CAREFUL, IS_KNOWN = np.arange(4)
 FIRST_ROW = 4
-LANE_ROWS = FIRST_ROW + int(W0_LOW // STRIDE)
+LANE_ROWS = FIRST_ROW + int(rows.W0_LOW // rows.STRIDE)
 
 
 @kernel
@@ -56,29 +49,32 @@ def keep_lane(pool, a, i, roster, is_known, worker):
     out[:] = 0.0
     out[POOL], out[NEXT], out[CAREFUL] = pool, roster[NEXT_STOP, i], followed.careful[j]
     out[IS_KNOWN] = 1.0 if is_known else 0.0
-    last = REF if not is_known else (R1 + STRIDE if worker.laws.degree % 2 == 1 else W0_LOW)
-    for k in range(last // STRIDE):
-        out[FIRST_ROW + k] = a[k * STRIDE + i]
+    last = rows.REF
+    if is_known:
+        last = rows.R1 + rows.STRIDE if worker.laws.is_waves else rows.W0_LOW
+    for k in range(last // rows.STRIDE):
+        out[FIRST_ROW + k] = a[k * rows.STRIDE + i]
 
 
 @kernel
 def take_lane(a, i, roster, j, worker):
     """Put a kept particle into a lane, before it is attended to."""
     kept = worker.followed.lanes[j]
-    for row in range(N_ROWS):
-        a[row * STRIDE + i] = 0.0
+    for row in range(rows.N_ROWS):
+        a[row * rows.STRIDE + i] = 0.0
     roster[PARTICLE, i], roster[NEXT_STOP, i] = j, int(kept[NEXT])
     worker.followed.careful[j] = int(kept[CAREFUL])
-    for k in range(W0_LOW // STRIDE):
-        a[k * STRIDE + i] = kept[FIRST_ROW + k]
-    a[STAY + i] = CAPTURED if a[STAY_OUT + i] == NEVER else OVER
-    if a[STAY_IN + i] == NEVER:
-        a[STAY + i] = NOT_YET
-    a[STOP + i], a[END + i] = -NEVER, -NEVER
-    if kept[IS_KNOWN] > 0.0 and worker.laws.degree % 2 == 0:
-        set_piece(a, i, int(a[PIECE + i]), worker.laws)
-    elif kept[IS_KNOWN] > 0.0:
-        a[END + i] = NEVER
+    for k in range(rows.W0_LOW // rows.STRIDE):
+        a[k * rows.STRIDE + i] = kept[FIRST_ROW + k]
+    a[rows.STAY + i] = rows.CAPTURED if a[rows.STAY_OUT + i] == rows.NEVER else rows.OVER
+    if a[rows.STAY_IN + i] == rows.NEVER:
+        a[rows.STAY + i] = rows.NOT_YET
+    a[rows.STOP + i], a[rows.END + i] = -rows.NEVER, -rows.NEVER
+    if kept[IS_KNOWN] > 0.0:
+        if worker.laws.is_waves:
+            a[rows.END + i] = rows.NEVER
+        else:
+            set_piece(a, i, int(a[rows.PIECE + i]), worker.laws)
 
 
 STAYS, MOVES, ENDS = 0, 1, 2
@@ -103,14 +99,15 @@ def note_stops(a, i, roster, last, stops, followed):
     j, at = roster[PARTICLE, i], roster[NEXT_STOP, i]
     times = stops.times
     while at < times.shape[0] and times[at] <= last:
-        begin, end = a[STAY_IN + i], a[STAY_OUT + i]
+        begin, end = a[rows.STAY_IN + i], a[rows.STAY_OUT + i]
         column = stops.columns[at]
         if column >= 0:
-            followed.energies[j, column] = 0.5 * (a[VX + i] * a[VX + i] + a[VY + i] * a[VY + i])
-            followed.is_captured[j, column] = begin < NEVER and end == NEVER
-        elif begin == NEVER or a[UNTIL + i] < begin:
-            a[SINCE + i] = a[UNTIL + i] = times[at]
-        if stops.cycles[at] >= 0 and begin < NEVER:
+            vx, vy = a[rows.VX + i], a[rows.VY + i]
+            followed.energies[j, column] = 0.5 * (vx * vx + vy * vy)
+            followed.is_captured[j, column] = begin < rows.NEVER and end == rows.NEVER
+        elif begin == rows.NEVER or a[rows.UNTIL + i] < begin:
+            a[rows.SINCE + i] = a[rows.UNTIL + i] = times[at]
+        if stops.cycles[at] >= 0 and begin < rows.NEVER:
             keep_stay(j, stops.cycles[at], begin, min(end, times[at]), stops, followed)
         at += 1
     roster[NEXT_STOP, i] = at
@@ -119,21 +116,21 @@ def note_stops(a, i, roster, last, stops, followed):
 @part
 def note_stay(a, i, roster, stops, followed):
     """Bring a lane's capture interval up to date with its last hit, and record it where it is over."""
-    stay, t, begin = a[STAY + i], a[T + i], a[STAY_IN + i]
-    end = min(a[STAY_OUT + i], t)
-    if stay >= CAPTURED:
-        a[STAY + i], a[STAY_IN + i], a[STAY_OUT + i] = CAPTURED, min(begin, t), NEVER
-    elif stay == OVER:
-        a[STAY_OUT + i] = end
-    elif begin < NEVER:
-        if begin <= a[UNTIL + i] and a[SINCE + i] <= end:
+    stay, t, begin = a[rows.STAY + i], a[rows.T + i], a[rows.STAY_IN + i]
+    end = min(a[rows.STAY_OUT + i], t)
+    if stay >= rows.CAPTURED:
+        a[rows.STAY + i], a[rows.STAY_IN + i], a[rows.STAY_OUT + i] = rows.CAPTURED, min(begin, t), rows.NEVER
+    elif stay == rows.OVER:
+        a[rows.STAY_OUT + i] = end
+    elif begin < rows.NEVER:
+        if begin <= a[rows.UNTIL + i] and a[rows.SINCE + i] <= end:
             at = roster[NEXT_STOP, i]
             while stops.cycles[at] < 0:  # the last stop ends a cycle
                 at += 1
             keep_stay(roster[PARTICLE, i], stops.cycles[at], begin, end, stops, followed)
             if stops.is_first_kept:
-                a[UNTIL + i] = -NEVER  # no other is wanted
-        a[STAY_IN + i] = a[STAY_OUT + i] = NEVER
+                a[rows.UNTIL + i] = -rows.NEVER  # no other is wanted
+        a[rows.STAY_IN + i] = a[rows.STAY_OUT + i] = rows.NEVER
 
 
 @part
@@ -142,23 +139,23 @@ def finish(pool, a, i, j, code, end, followed):
 
     In the disk a particle is unfolded, whatever its spin: in a cap that may be 0.
     """
-    t, t_low, x, y, vx, vy = a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i]
+    t, t_low, x, y, vx, vy, wall = particle_of(a, i)
     if code == HORIZON:
         dt = (end - t) - t_low
         t, t_low = end, 0.0
         x, y_end = fma(vx, dt, x), fma(vy, dt, y)
-        if pool == DISK and a[WALL + i] == ON_ARC:  # the base may lie between
+        if pool == DISK and a[rows.WALL + i] == rows.ON_ARC:  # the base may lie between
             if y * y_end < 0.0:
-                a[N_BASE + i] += 1.0
+                a[rows.N_BASE + i] += 1.0
             if y_end < 0.0:
                 y_end, vy = -y_end, -vy
         y = y_end
-    write_state(followed.states, j, Particle(t, t_low, x, y, vx, vy, int(a[WALL + i])))
+    write_state(followed.states, j, Particle(t, t_low, x, y, vx, vy, wall))
     followed.codes[j] = code
     if code != HORIZON and followed.lanes.shape[1] > 0:
         followed.lanes[j] = np.nan  # nothing goes on from there
     for wall in range(N_WALLS):
-        followed.counts[j, wall] = int(a[N_ARC + wall * STRIDE + i])
+        followed.counts[j, wall] = int(a[rows.N_ARC + wall * rows.STRIDE + i])
 
 
 @kernel
@@ -174,7 +171,7 @@ def set_stop(a, i, since, roster, worker):
     """Tell a lane when `attend` is to look at it next: never later than a period after the time `since`."""
     times, at, pieces = worker.stops.times, roster[NEXT_STOP, i], worker.laws.pieces
     stop = min(since + pieces.period, pieces.until)
-    a[STOP + i] = min(stop, times[at]) if at < times.shape[0] else stop
+    a[rows.STOP + i] = min(stop, times[at]) if at < times.shape[0] else stop
 
 
 @kernel
@@ -189,18 +186,18 @@ def careful_flight(a, i, worker):
 def land_carefully(pool, a, i, code, s, p, worker):
     """Move a lane to the collision that a scalar step has found; the anchors hold the laws there."""
     scene, hit = worker.laws.scene, float(code)
-    if code != ARC or a[WALL + i] != ON_ARC:  # it has left the arc by now
-        a[AS_GIVEN + i] = 0.0
+    if code != ARC or a[rows.WALL + i] != rows.ON_ARC:  # it has left the arc by now
+        a[rows.AS_GIVEN + i] = 0.0
     if worker.laws.scene.table == MUSHROOM:
-        w, vx, vy = worker.anchors[WIDTH, VALUE], a[VX + i], a[VY + i]
+        w, vx, vy = worker.anchors[WIDTH, VALUE], a[rows.VX + i], a[rows.VY + i]
         if scene.is_relative:
             w *= worker.anchors[RADIUS, VALUE]
-        a[STAY + i] = stay_after(a[STAY + i], hit, p, (vx, vy, fma(vx, vx, vy * vy)), w)
+        a[rows.STAY + i] = stay_after(a[rows.STAY + i], hit, p, (vx, vy, fma(vx, vx, vy * vy)), w)
     if pool == DISK:
-        a[SPIN + i] = p.x * p.vy - p.y * p.vx
+        a[rows.SPIN + i] = p.x * p.vy - p.y * p.vx
     count_hit(a, i, hit)
     put_particle(a, i, p)
-    a[WALL + i], a[S + i], a[TRIES + i] = hit, s, 0.0
+    a[rows.WALL + i], a[rows.S + i], a[rows.TRIES + i] = hit, s, 0.0
     if worker.is_laned:
         know_laws(a, i, 0.0, worker.laws)
 
@@ -217,7 +214,7 @@ def step_carefully(pool, a, i, roster, worker):
     while True:
         code, s, p = careful_flight(a, i, worker)
         followed.careful[roster[PARTICLE, i]] += 1
-        if code > HORIZON:
+        if is_lost(code):
             return code
         # Rounded, the time at the horizon may be before it.
         note_stops(a, i, roster, stops.times[-1] if code == HORIZON else p.t, stops, followed)
@@ -231,13 +228,16 @@ def step_carefully(pool, a, i, roster, worker):
 @part
 def collisions_of(a, i):
     """Return how many collisions a lane's particle has had."""
-    return a[N_ARC + i] + a[N_BASE + i] + a[N_LEFT + i] + a[N_RIGHT + i] + a[N_FLOOR + i]
+    total = 0.0
+    for wall in range(N_WALLS):
+        total += a[rows.N_ARC + wall * rows.STRIDE + i]
+    return total
 
 
 @part
 def knows_laws(a, i, worker):
     """Tell whether the lanes may take a particle's next step."""
-    return worker.is_laned and a[END + i] > -NEVER and a[AS_GIVEN + i] == 0.0
+    return worker.is_laned and a[rows.END + i] > -rows.NEVER and a[rows.AS_GIVEN + i] == 0.0
 
 
 @kernel
@@ -246,16 +246,16 @@ def mark(pool, a, i, since, roster, worker):
 
     Its flight was looked at up to the time `since`.
     """
-    is_clearly_captured = a[STAY + i] == CLEARLY
+    is_clearly_captured = a[rows.STAY + i] == rows.CLEARLY
     note_stay(a, i, roster, worker.stops, worker.followed)
-    if a[T + i] >= a[END + i] and a[END + i] > -NEVER:
-        set_reference(a, i, a[T + i], a[T_LOW + i], worker.laws)
+    if a[rows.T + i] >= a[rows.END + i] and a[rows.END + i] > -rows.NEVER:
+        set_reference(a, i, a[rows.T + i], a[rows.T_LOW + i], worker.laws)
     if knows_laws(a, i, worker):
         set_stop(a, i, since, roster, worker)
     else:
-        a[STOP + i] = -NEVER
+        a[rows.STOP + i] = -rows.NEVER
     if pool == GENERAL and is_clearly_captured and worker.is_laned:
-        a[SPIN + i] = dot(a[X + i], a[VY + i], -a[Y + i], a[VX + i])
+        a[rows.SPIN + i] = dot(a[rows.X + i], a[rows.VY + i], -a[rows.Y + i], a[rows.VX + i])
         return MOVES
     return STAYS
 
@@ -264,25 +264,25 @@ def mark(pool, a, i, since, roster, worker):
 def code_of_attention(pool, a, i, roster, worker):
     """Take a lane past stops, or a scalar step; returns the code of its end, or ARC for none."""
     stops, followed, end = worker.stops, worker.followed, worker.stops.times[-1]
-    is_late = knows_laws(a, i, worker) and a[FATE + i] == LATE
-    if followed.lanes.shape[1] > 0 and not (is_late and a[WHEN + i] < end):
+    is_late = knows_laws(a, i, worker) and a[rows.FATE + i] == rows.LATE
+    if followed.lanes.shape[1] > 0 and not (is_late and a[rows.WHEN + i] < end):
         # It may end here. A step that was refused is kept as one of unknown laws: tried again, from another
         # piece, it may be shown right, and then other bits would follow than in a run at once.
         keep_lane(pool, a, i, roster, is_late, worker)
     code = ARC
     if is_late:
-        note_stops(a, i, roster, a[WHEN + i], stops, followed)
+        note_stops(a, i, roster, a[rows.WHEN + i], stops, followed)
         if roster[NEXT_STOP, i] == stops.times.shape[0]:
             code = HORIZON
-        if not a[WHEN + i] < worker.laws.pieces.until:
-            a[END + i] = -NEVER
+        if not a[rows.WHEN + i] < worker.laws.pieces.until:
+            a[rows.END + i] = -rows.NEVER
     else:
         code = step_carefully(pool, a, i, roster, worker)
-        code = ARC if code < HORIZON else code
+        code = ARC if is_hit(code) else code
     if roster[NEXT_STOP, i] < worker.n_passed:
         # Put back, it does not pass all stops again: the last had come within rounding of a collision, or the
         # scalar step, which now looks further, is undecided. A run at once would have written otherwise.
-        return np.int64(ANEW)
+        return np.int64(FOLLOW_ANEW)
     if code == ARC and collisions_of(a, i) > stops.most:
         if pool == DISK:
             refold(a, i)
@@ -296,25 +296,27 @@ def attend(pool, a, i, roster, worker):
 
     A particle with too many collisions is given up: energy may grow without end.
     """
-    fate, knows = a[FATE + i], knows_laws(a, i, worker)
-    if knows and fate == MARKED:
-        return mark(pool, a, i, a[T + i], roster, worker)
-    if knows and fate == FAR and a[TRIES + i] <= MAX_CORRECTIONS:  # the piece at the flight's end
-        t = a[T + i] + a[S + i]
-        set_reference(a, i, t, a[T_LOW + i], worker.laws)
-        if a[END + i] > -NEVER:
+    fate, knows = a[rows.FATE + i], knows_laws(a, i, worker)
+    if knows and fate == rows.MARKED:
+        return mark(pool, a, i, a[rows.T + i], roster, worker)
+    if (
+        knows and fate == rows.FAR and a[rows.TRIES + i] <= rows.MAX_CORRECTIONS
+    ):  # the piece at the flight's end
+        t = a[rows.T + i] + a[rows.S + i]
+        set_reference(a, i, t, a[rows.T_LOW + i], worker.laws)
+        if a[rows.END + i] > -rows.NEVER:
             return STAYS
-    if pool == DISK and worker.laws.scene.table == MUSHROOM and not (knows and fate == LATE):
+    if pool == DISK and worker.laws.scene.table == MUSHROOM and not (knows and fate == rows.LATE):
         refold(a, i)
-        a[WALL + i], a[TRIES + i] = ON_ARC, 0.0
+        a[rows.WALL + i], a[rows.TRIES + i] = rows.ON_ARC, 0.0
         return MOVES
     # A flight that takes longer than a period was looked at up to its end; else it would be again and again.
-    flown = a[WHEN + i] if knows and fate == LATE else -NEVER
+    flown = a[rows.WHEN + i] if knows and fate == rows.LATE else -rows.NEVER
     code = code_of_attention(pool, a, i, roster, worker)
     if code != ARC:
         finish(pool, a, i, roster[PARTICLE, i], code, worker.stops.times[-1], worker.followed)
         return ENDS
-    return mark(pool, a, i, max(flown, a[T + i]), roster, worker)
+    return mark(pool, a, i, max(flown, a[rows.T + i]), roster, worker)
 
 
 @part
@@ -322,15 +324,15 @@ def last_to_attend(a, n):
     """Return the last of n lanes that needs attention, -1 for none, as is mostly so; one packed loop."""
     last = np.int64(-1)
     for i in range(n):
-        last = max(last, np.int64(i) if a[FATE + i] < MOVED else np.int64(-1))
+        last = max(last, np.int64(i) if a[rows.FATE + i] < rows.MOVED else np.int64(-1))
     return last
 
 
 @part
 def change_place(worker, pool, i, other, j):
     """Copy a lane and its entry in the roster to another place; without coefficients where laws are waves."""
-    last = POOL_SIZE if worker.laws.degree % 2 == 0 else LAWS
-    copy_rows(worker.pools[pool], i, worker.pools[other], j, T, last)
+    last = rows.LAWS if worker.laws.is_waves else rows.POOL_SIZE
+    copy_rows(worker.pools[pool], i, worker.pools[other], j, rows.T, last)
     worker.rosters[other, PARTICLE, j] = worker.rosters[pool, PARTICLE, i]
     worker.rosters[other, NEXT_STOP, j] = worker.rosters[pool, NEXT_STOP, i]
 
@@ -343,7 +345,7 @@ def scan(pool, worker):
     while i >= 0:
         fate = attend(pool, a, i, roster, worker)
         if fate == MOVES:
-            a[FATE + i] = MOVED  # of a flight in the other pool nothing is known yet
+            a[rows.FATE + i] = rows.MOVED  # of a flight in the other pool nothing is known yet
             change_place(worker, pool, i, other, n_held[other])
             n_held[other] += 1
         if fate != STAYS:
@@ -358,7 +360,7 @@ def take_in(worker, j, wall):
     n_held, followed = worker.n_held, worker.followed
     home = DISK if worker.laws.scene.table == CAP else GENERAL
     if worker.n_passed > 0 and not followed.lanes[j, 0] >= 0.0:
-        followed.codes[j] = ANEW
+        followed.codes[j] = FOLLOW_ANEW
         return
     if worker.n_passed > 0:
         home = DISK if followed.lanes[j, 0] > 0.0 else GENERAL
@@ -382,7 +384,7 @@ def follow_particles(worker, walls):
     pools, n_held = worker.pools, worker.n_held
     first, last = 0, worker.followed.states.shape[0]
     while worker.stops.called_off[0] == 0:
-        while n_held[GENERAL] + n_held[DISK] < LANES and first < last:
+        while n_held[GENERAL] + n_held[DISK] < rows.LANES and first < last:
             take_in(worker, first, walls[first])
             first += 1
         if n_held[GENERAL] + n_held[DISK] == 0:
@@ -392,134 +394,3 @@ def follow_particles(worker, walls):
             if n > 0 and worker.is_laned:
                 advance(pool, pools[pool], whole_registers(n), worker)
             scan(pool, worker)
-
-
-# One particle from collision to collision. A lane computes what each wall asks for and then chooses; one
-# particle alone asks only for what its wall needs. Each number is found by the same operations, so that it is
-# the same to the bit: `aim_alone` is `aim` with branches, and `fly_alone` tells `land` in each branch which
-# wall is met, so that the compiler leaves out what the others ask for.
-FIRST = np.int64(0)  # the lane in use
-
-
-@packed
-def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
-    """Choose the wall and guess the time, as `aim` does; returns the wall."""
-    outset, now = outset_of(a, FIRST), laws_in(a, R0 + FIRST, waves, is_relative, slope, degree)
-    _, y, _, vy, wall, _, _ = outset
-    depth, rise = abs(y), abs(vy)
-    k_side = side_curvature(vy, slope, limits)
-    sure, root = 1.0, 1.0
-    if wall <= ON_BASE and not is_stem:
-        f, d, root = arc_quotient(outset, now.r, now.r1, now.r2)
-        hit = ON_ARC
-        if vy < 0.0 and not fma(y, d, vy * f) > 0.0:
-            gap, doubt = mouth_crossing(outset, now.w, now.w1, k_side, limits)
-            sure, root = abs(gap * rise) - doubt, 1.0
-            f, d, hit = nearest_below(outset, now, slope) if gap > 0.0 else (depth, rise, ON_BASE)
-    else:
-        f, d, hit = nearest_below(outset, now, slope)
-        is_crossing = vy > 0.0 and not fma(depth, d, -f * vy) > 0.0
-        if is_crossing and is_stem:
-            f, d, hit = depth, rise, ON_BASE
-        elif is_crossing:
-            gap, doubt = mouth_crossing(outset, now.w, now.w1, k_side + limits.lift, limits)
-            f, d, root = arc_quotient(outset, now.r, now.r1, now.r2)
-            sure, hit = gap * rise - doubt, ON_ARC
-    inverse = ONE / (d * root)
-    s, beyond = f * (root * inverse), 0.0
-    if hit == ON_ARC:
-        beyond = cube_of_arc(now.r, now.r1, now.r2, now.r3) * s * s * d
-    elif hit == ON_FLOOR:
-        beyond = now.h2 * s
-    elif hit != ON_BASE:
-        beyond = side_bend(y, vy, now, slope) * s
-    a[S] = a[S] if a[TRIES] > 0.0 else s * fma(0.5 * beyond, inverse, 1.0)
-    a[SURE] = sure
-    return hit
-
-
-@packed
-def land_on(a, hit, is_stem, is_relative, waves, slope, degree, limits):
-    """Take the step to a wall, if that is shown right; stays are of no interest."""
-    a[HIT] = hit
-    land(a, FIRST, (is_stem, False, is_relative), waves, slope, degree, limits)
-
-
-@packed
-def fly_alone(a, is_stem, is_relative, waves, slope, degree, limits):
-    """Find the next collision, and take the step where it is shown right, as `fly` does."""
-    scene = is_stem, is_relative, waves, slope, degree, limits
-    hit = aim_alone(a, *scene)
-    look_ahead(a, FIRST, a[S], waves, is_relative, slope, degree)
-    if hit == ON_ARC:
-        land_on(a, ON_ARC, *scene)
-    elif hit == ON_BASE:
-        land_on(a, ON_BASE, *scene)
-    elif hit == ON_LEFT:
-        land_on(a, ON_LEFT, *scene)
-    elif hit == ON_RIGHT:
-        land_on(a, ON_RIGHT, *scene)
-    else:
-        land_on(a, ON_FLOOR, *scene)
-
-
-@part
-def next_hit(a, worker, waves, slope, degree):
-    """Take the next step of the particle in the first lane; returns its wall, or what comes instead.
-
-    The lanes' answer is taken unless the end may come before: there the scalar step looks from both sides.
-    """
-    limit = (worker.stops.times[-1] - a[T]) - a[T_LOW]
-    a[STOP] = min(a[T] + limit * (1.0 - 4.0 * NEAR), worker.laws.pieces.until)
-    is_stem, is_relative = worker.laws.scene.table == STEM, worker.laws.scene.is_relative
-    while knows_laws(a, FIRST, worker):
-        fly_alone(a, is_stem, is_relative, waves, slope, degree, worker.laws.limits)
-        if a[FATE] == MOVED or a[FATE] == MARKED:
-            if a[T] >= a[END]:
-                set_reference(a, FIRST, a[T], a[T_LOW], worker.laws)
-            return int(a[WALL])
-        if a[FATE] == FAR and a[TRIES] <= MAX_CORRECTIONS:
-            set_reference(a, FIRST, a[T] + a[S], a[T_LOW], worker.laws)
-        elif a[FATE] != COARSE:
-            break
-    code, s, p = careful_flight(a, FIRST, worker)
-    if code < HORIZON:
-        land_carefully(GENERAL, a, FIRST, code, s, p, worker)
-    else:
-        put_particle(a, FIRST, p)
-    return code
-
-
-def _path(is_slope_moving, form):
-    degree, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
-
-    @kept(is_slope_moving, form, nogil=True, **HOW)
-    def follow_path(worker, wall, factors, steps, walls):
-        """Follow a worker's one particle through as many collisions as there is room for in steps and walls.
-
-        Returns:
-            How many there are, and the last wall's code or what came instead: ANSWER_LOST before a step that
-            loses a bit by `factors`, see `write_step`.
-        """
-        laws = worker.laws
-        waves, slope = laws.waves if is_waves else None, None if is_slope_moving else laws.slope
-        states, a = worker.followed.states, worker.pools[GENERAL]
-        load(a, FIRST, particle_at(states, 0, wall), False)
-        code, n = wall, 0
-        while n < steps.shape[0] and worker.stops.called_off[0] == 0:
-            code = next_hit(a, worker, waves, slope, degree)
-            if code >= HORIZON:
-                break
-            if not write_step(steps, n, factors, a[S], particle_of(a, FIRST)):
-                code = ANSWER_LOST
-                break
-            walls[n] = code
-            n += 1
-        write_state(states, 0, particle_of(a, FIRST))
-        return n, code
-
-    return follow_path
-
-
-# By whether the slope moves, and by the form of the laws.
-PATHS = {(moves, form): _path(moves, form) for moves in (False, True) for form in FORMS}

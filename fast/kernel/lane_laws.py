@@ -8,8 +8,8 @@ since the begin follows from the turn of the phase by sum formulas, without a di
 of a constant, a Fourier sum or a half-leg between knots, in any mixture. When a piece no longer serves, the
 lane is given the next. Why the polynomials may be trusted is said where they are cut, in fast.pieces.
 
-`waves` is None for pieces, `slope` is None where the slope moves; `degree` is a tuple as long as a form's
-number in FORMS, so that each form is compiled by itself.
+`waves` is None for pieces, `slope` is None where the slope moves; `form` is a tuple as long as a form's
+number (ONE_WAVE, TWO_WAVES, or the degree of pieces), so that each form is compiled by itself.
 """
 
 from typing import NamedTuple
@@ -20,14 +20,14 @@ from fast.kernel.arithmetic import (  # isort: skip
     PIO2_1, PIO2_2, PIO2_3, TWO_OVER_PI, add, beyond_first_order, fma, sine_cosine, sub, times, turned,
     two_product, two_sum,
 )  # fmt: skip
+from fast.kernel import rows
 from fast.kernel.compiling import kept, kernel, packed, part
 from fast.kernel.laws import bend_of_half_leg, set_anchors, whole_periods
 
 from fast.kernel.records import (  # isort: skip
-    AHEAD, AMPLITUDES, ANCHORS_SHAPE, BACK, BANG_BANG, BEFORE, CONSTANT, COSINE, COSINE_LOW, DEPTH,
-    DEPTH_LAW, END, FOURIER, HALF_LEG, KIND, LAWS, LIMIT, MEAN_RATE, NEVER, N_COEFFICIENTS, N_HARMONICS,
-    OMEGA, PHASE, PHASE_COSINE, PHASE_SINE, PIECE, R0, RADIUS, RADIUS_LAW, RATE, REF, REF_LOW, SINE,
-    SINE_LOW, SLOPE, SLOPE_LAW, STRIDE, T, T_LOW, VALUE, VALUE_LOW, WIDTH, WIDTH_LAW, LaneWaves,
+    AMPLITUDES, ANCHORS_SHAPE, BANG_BANG, CONSTANT, COSINE, COSINE_LOW, DEPTH, FOURIER,
+    HALF_LEG, KIND, N_HARMONICS, OMEGA, PHASE, RADIUS, RATE, SINE, SINE_LOW, SLOPE, VALUE,
+    VALUE_LOW, WIDTH, LaneWaves,
 )  # fmt: skip
 
 PARABOLA, SERIES = DEGREES = 2, 12  # with the latter a harmonic takes 27 pieces
@@ -124,7 +124,7 @@ def fill_pieces(laws, references, coefficients):
             out[0], out[1], out[2] = anchors[row, VALUE], anchors[row, VALUE_LOW], anchors[row, RATE]
 
 
-ONE_WAVE, TWO_WAVES = 1, 3  # odd, pieces' degrees are even
+ONE_WAVE, TWO_WAVES = 1, 3  # neither is a degree of pieces, so that a number names a form
 PIO2_REST = PIO2_2 + PIO2_3
 LONGEST_TURN = 0.75  # of the highest harmonic in a hop: `beyond_first_order` serves to pi / 4
 NO_WAVES = LaneWaves(0.0, 0.0, *[(0.0,) * 5] * 4)
@@ -172,11 +172,11 @@ def twice(sine, cosine):
 
 
 @packed
-def law_of_waves(law, sine, cosine, omega, degree):
+def law_of_waves(law, sine, cosine, omega, form):
     """Return a law and three derivatives at a fundamental phase."""
     even, odd = wave_parts(law, 1, sine, cosine)
     f, rate, bend, third = even, odd, even, odd
-    if len(degree) == TWO_WAVES:
+    if len(form) == TWO_WAVES:
         even, odd = wave_parts(law, 2, *twice(sine, cosine))
         f, rate, bend, third = f + even, fma(2.0, odd, rate), fma(4.0, even, bend), fma(8.0, odd, third)
     omega2 = -omega * omega
@@ -184,15 +184,15 @@ def law_of_waves(law, sine, cosine, omega, degree):
 
 
 @packed
-def laws_of_waves(sine, cosine, waves, is_relative, slope, degree):
+def laws_of_waves(sine, cosine, waves, is_relative, slope, form):
     """Return all laws at a fundamental phase."""
     omega = waves.omega
-    r, r1, r2, r3 = law_of_waves(waves.r, sine, cosine, omega, degree)
-    nu, nu1, nu2, _ = law_of_waves(waves.w, sine, cosine, omega, degree)
+    r, r1, r2, r3 = law_of_waves(waves.r, sine, cosine, omega, form)
+    nu, nu1, nu2, _ = law_of_waves(waves.w, sine, cosine, omega, form)
     w, w_low, w1, w2 = width_of(nu, nu1, nu2, r, r1, r2, is_relative)
-    h, h1, h2, _ = law_of_waves(waves.h, sine, cosine, omega, degree)
+    h, h1, h2, _ = law_of_waves(waves.h, sine, cosine, omega, form)
     if slope is None:
-        m, m1, m2, _ = law_of_waves(waves.m, sine, cosine, omega, degree)
+        m, m1, m2, _ = law_of_waves(waves.m, sine, cosine, omega, form)
     else:
         m, m1, m2 = slope, 0.0, 0.0
     return LawsAt(r, r1, r2, r3, w, w_low, w1, w2, h, h1, h2, m, m1, m2)
@@ -214,78 +214,90 @@ def fresh_phase(t, t_low, waves):
 
 
 @packed
-def laws_in(a, place, waves, is_relative, slope, degree):
+def laws_in(a, place, waves, is_relative, slope, form):
     """Return the laws in the rows of a lane that begin at `place`: R0 for those now, or AHEAD."""
     if waves is not None:
-        return laws_of_waves(a[place], a[place + STRIDE], waves, is_relative, slope, degree)
-    r, r1, r2, r3 = a[place], a[place + STRIDE], a[place + 2 * STRIDE], a[place + 3 * STRIDE]
-    w, w1, w2 = a[place + 4 * STRIDE], a[place + 5 * STRIDE], a[place + 6 * STRIDE]
-    h, h1, h2 = a[place + 7 * STRIDE], a[place + 8 * STRIDE], a[place + 9 * STRIDE]
-    w_low = a[place + 13 * STRIDE]
+        return laws_of_waves(a[place], a[place + rows.STRIDE], waves, is_relative, slope, form)
+    r, r1, r2, r3 = a[place], a[place + rows.STRIDE], a[place + 2 * rows.STRIDE], a[place + 3 * rows.STRIDE]
+    w, w1, w2 = a[place + 4 * rows.STRIDE], a[place + 5 * rows.STRIDE], a[place + 6 * rows.STRIDE]
+    h, h1, h2 = a[place + 7 * rows.STRIDE], a[place + 8 * rows.STRIDE], a[place + 9 * rows.STRIDE]
+    w_low = a[place + 13 * rows.STRIDE]
     m, m1, m2 = slope, 0.0, 0.0
     if slope is None:
-        m, m1, m2 = a[place + 10 * STRIDE], a[place + 11 * STRIDE], a[place + 12 * STRIDE]
+        m, m1, m2 = a[place + 10 * rows.STRIDE], a[place + 11 * rows.STRIDE], a[place + 12 * rows.STRIDE]
     return LawsAt(r, r1, r2, r3, w, w_low, w1, w2, h, h1, h2, m, m1, m2)
 
 
 @packed
 def write_laws(a, place, laws, slope):
     """Write laws of pieces into the rows of a lane that begin at `place`."""
-    a[place], a[place + STRIDE], a[place + 2 * STRIDE], a[place + 3 * STRIDE] = (
+    a[place], a[place + rows.STRIDE], a[place + 2 * rows.STRIDE], a[place + 3 * rows.STRIDE] = (
         laws.r,
         laws.r1,
         laws.r2,
         laws.r3,
     )
-    a[place + 4 * STRIDE], a[place + 5 * STRIDE], a[place + 6 * STRIDE] = laws.w, laws.w1, laws.w2
-    a[place + 7 * STRIDE], a[place + 8 * STRIDE], a[place + 9 * STRIDE] = laws.h, laws.h1, laws.h2
+    a[place + 4 * rows.STRIDE], a[place + 5 * rows.STRIDE], a[place + 6 * rows.STRIDE] = (
+        laws.w,
+        laws.w1,
+        laws.w2,
+    )
+    a[place + 7 * rows.STRIDE], a[place + 8 * rows.STRIDE], a[place + 9 * rows.STRIDE] = (
+        laws.h,
+        laws.h1,
+        laws.h2,
+    )
     if slope is None:
-        a[place + 10 * STRIDE], a[place + 11 * STRIDE], a[place + 12 * STRIDE] = laws.m, laws.m1, laws.m2
-    a[place + 13 * STRIDE] = laws.w_low
+        a[place + 10 * rows.STRIDE], a[place + 11 * rows.STRIDE], a[place + 12 * rows.STRIDE] = (
+            laws.m,
+            laws.m1,
+            laws.m2,
+        )
+    a[place + 13 * rows.STRIDE] = laws.w_low
 
 
 @packed
-def look_ahead(a, i, s, waves, is_relative, slope, degree):
+def look_ahead(a, i, s, waves, is_relative, slope, form):
     """Write the laws after a flight, from AHEAD on.
 
     In a loop of its own: one loop over everything has more instructions than a processor looks ahead, so that
     it would wait for one register of lanes before it begins with the next.
     """
     if waves is None:
-        read_pieces(a, i, AHEAD + i, s, is_relative, slope, degree)
+        read_pieces(a, i, rows.AHEAD + i, s, is_relative, slope, form)
     else:
-        t, low = two_sum(a[T + i], s)
-        a[AHEAD + i], a[AHEAD + STRIDE + i] = fresh_phase(t, low + a[T_LOW + i], waves)
+        t, low = two_sum(a[rows.T + i], s)
+        a[rows.AHEAD + i], a[rows.AHEAD + rows.STRIDE + i] = fresh_phase(t, low + a[rows.T_LOW + i], waves)
 
 
 @packed
-def read_pieces(a, i, place, s, is_relative, slope, degree):
+def read_pieces(a, i, place, s, is_relative, slope, form):
     """Write a lane's laws after a flight into the rows from `place` on, from its coefficients."""
-    before = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
+    before = (a[rows.T + i] - a[rows.REF + i]) + (a[rows.T_LOW + i] - a[rows.REF_LOW + i])
     u = before + s
-    r, r1, r2, mean_rate = law_at(a, RADIUS_LAW + i, STRIDE, u, before, degree)
-    r3 = third_derivative(a, RADIUS_LAW + i, STRIDE, u, degree)
-    nu, nu1, nu2, _ = law_at(a, WIDTH_LAW + i, STRIDE, u, u, degree)
+    r, r1, r2, mean_rate = law_at(a, rows.RADIUS_LAW + i, rows.STRIDE, u, before, form)
+    r3 = third_derivative(a, rows.RADIUS_LAW + i, rows.STRIDE, u, form)
+    nu, nu1, nu2, _ = law_at(a, rows.WIDTH_LAW + i, rows.STRIDE, u, u, form)
     w, w_low, w1, w2 = width_of(nu, nu1, nu2, r, r1, r2, is_relative)
-    h, h1, h2, _ = law_at(a, DEPTH_LAW + i, STRIDE, u, u, degree)
+    h, h1, h2, _ = law_at(a, rows.DEPTH_LAW + i, rows.STRIDE, u, u, form)
     m, m1, m2 = 0.0, 0.0, 0.0
     if slope is None:
-        m, m1, m2, _ = law_at(a, SLOPE_LAW + i, STRIDE, u, u, degree)
-    a[BEFORE + i], a[MEAN_RATE + i] = before, mean_rate
+        m, m1, m2, _ = law_at(a, rows.SLOPE_LAW + i, rows.STRIDE, u, u, form)
+    a[rows.BEFORE + i], a[rows.MEAN_RATE + i] = before, mean_rate
     write_laws(a, place, LawsAt(r, r1, r2, r3, w, w_low, w1, w2, h, h1, h2, m, m1, m2), slope)
 
 
 @packed
-def radius_since(a, i, s, waves, degree):
+def radius_since(a, i, s, waves, form):
     """Return the radius at a flight's begin, its increase since, and `known` of docs/lanes.md."""
     if waves is None:
-        return a[R0 + i], s * a[MEAN_RATE + i], a[BEFORE + i] - a[BACK + i]
-    law, sine, cosine, turn = waves.r, a[PHASE_SINE + i], a[PHASE_COSINE + i], waves.omega * s
+        return a[rows.R0 + i], s * a[rows.MEAN_RATE + i], a[rows.BEFORE + i] - a[rows.BACK + i]
+    law, sine, cosine, turn = waves.r, a[rows.PHASE_SINE + i], a[rows.PHASE_COSINE + i], waves.omega * s
     more, less = beyond_first_order(turn)
     across = turn + more  # sin and, in `less`, cos - 1 of the turn
     even, odd = wave_parts(law, 1, sine, cosine)
     r, dr = law[0] + even, fma(odd, across, even * less)
-    if len(degree) == TWO_WAVES:
+    if len(form) == TWO_WAVES:
         even, odd = wave_parts(law, 2, *twice(sine, cosine))
         r, dr = r + even, fma(2.0 * across, fma(odd, 1.0 + less, -even * across), dr)
         return r, dr, LONGEST_TURN - 2.0 * turn
@@ -296,7 +308,7 @@ def radius_since(a, i, s, waves, degree):
 def room_ahead(a, i, s, delta, waves):
     """Return for how long after a flight's end, as guessed and as corrected, the laws used there hold."""
     if waves is None:
-        u, limit = a[BEFORE + i] + s, a[LIMIT + i]
+        u, limit = a[rows.BEFORE + i] + s, a[rows.LIMIT + i]
         return limit - abs(u), limit - abs(u + delta)
     return 1.0, 1.0
 
@@ -305,33 +317,35 @@ def room_ahead(a, i, s, delta, waves):
 def move_laws(a, i, delta, at_hit, waves, slope):
     """Take the laws at the hit, `delta` after the end that was guessed, for the present ones."""
     if waves is None:
-        write_laws(a, R0 + i, at_hit, slope)
+        write_laws(a, rows.R0 + i, at_hit, slope)
     else:
-        sine, cosine, turn = a[AHEAD + i], a[AHEAD + STRIDE + i], waves.omega * delta
-        a[PHASE_SINE + i], a[PHASE_COSINE + i] = fma(turn, cosine, sine), fma(-turn, sine, cosine)
+        sine, cosine, turn = a[rows.AHEAD + i], a[rows.AHEAD + rows.STRIDE + i], waves.omega * delta
+        a[rows.PHASE_SINE + i], a[rows.PHASE_COSINE + i] = fma(turn, cosine, sine), fma(-turn, sine, cosine)
 
 
 @part
 def set_piece(a, i, piece, laws):
     """Give a lane a piece of the laws whose reference time it has."""
-    a[PIECE + i], a[END + i] = piece, a[REF + i] + laws.pieces.serves[piece]
-    a[BACK + i], a[LIMIT + i] = -laws.pieces.limits[piece], laws.pieces.limits[piece]
+    a[rows.PIECE + i], a[rows.END + i] = piece, a[rows.REF + i] + laws.pieces.serves[piece]
+    a[rows.BACK + i], a[rows.LIMIT + i] = -laws.pieces.limits[piece], laws.pieces.limits[piece]
     if laws.scene.laws[RADIUS, KIND] == CONSTANT:
-        a[BACK + i] = -NEVER
+        a[rows.BACK + i] = -rows.NEVER
     for row in range(4):
         # The lane has 0 where no piece has anything else.
-        n_coefficients = 1 if laws.scene.laws[row, KIND] == CONSTANT else laws.degree + 2
+        n_coefficients = 1 if laws.scene.laws[row, KIND] == CONSTANT else laws.form + 2
         for j in range(n_coefficients):
-            a[LAWS + (row * N_COEFFICIENTS + j) * STRIDE + i] = laws.pieces.coefficients[piece, row, j]
+            a[rows.LAWS + (row * rows.N_COEFFICIENTS + j) * rows.STRIDE + i] = laws.pieces.coefficients[
+                piece, row, j
+            ]
 
 
 @kernel
 def set_reference(a, i, t, t_low, laws):
     """Give a lane the piece of the laws that serves at a time; END is minus infinity where none does."""
     if not abs(t) < laws.pieces.until:
-        a[END + i] = -NEVER
+        a[rows.END + i] = -rows.NEVER
         return
-    piece, a[REF + i], a[REF_LOW + i] = piece_at(laws.pieces, t, t_low)
+    piece, a[rows.REF + i], a[rows.REF_LOW + i] = piece_at(laws.pieces, t, t_low)
     set_piece(a, i, piece, laws)
 
 
@@ -341,16 +355,16 @@ def know_laws(a, i, early, laws):
 
     END is minus infinity where they are out of reach.
     """
-    t, t_low = a[T + i], a[T_LOW + i]
-    if laws.degree % 2 == 0:
+    t, t_low = a[rows.T + i], a[rows.T_LOW + i]
+    if not laws.is_waves:
         set_reference(a, i, t - early, t_low, laws)
-        if laws.degree == PARABOLA:
-            read_pieces(a, i, R0 + i, 0.0, laws.scene.is_relative, None, SHORT)
+        if laws.form == PARABOLA:
+            read_pieces(a, i, rows.R0 + i, 0.0, laws.scene.is_relative, None, SHORT)
         else:
-            read_pieces(a, i, R0 + i, 0.0, laws.scene.is_relative, None, LONG)
+            read_pieces(a, i, rows.R0 + i, 0.0, laws.scene.is_relative, None, LONG)
     elif abs(t) < laws.pieces.until:
         sine, _, cosine, _, _ = sine_cosine(laws.waves.omega, laws.waves.omega_low, 1.0, t, t_low)
-        a[PHASE_SINE + i], a[PHASE_COSINE + i] = sine, cosine
-        a[END + i] = NEVER
+        a[rows.PHASE_SINE + i], a[rows.PHASE_COSINE + i] = sine, cosine
+        a[rows.END + i] = rows.NEVER
     else:
-        a[END + i] = -NEVER
+        a[rows.END + i] = -rows.NEVER

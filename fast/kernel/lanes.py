@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fast.kernel import rows
 from fast.kernel.arithmetic import SAFETY, dot, fma, short_sum, two_product, two_sum
 from fast.kernel.compiling import packed, part, widest_registers
 from fast.kernel.lane_laws import (
@@ -30,13 +31,7 @@ from fast.kernel.lane_laws import (
     radius_since,
     room_ahead,
 )
-
-from fast.kernel.records import (  # isort: skip
-    AHEAD, CAP, CAPTURED, CLEARLY, COARSE, END, FAR, FATE, HIT, LATE, MARKED, MAX_CORRECTIONS, MOVED,
-    MUSHROOM, NEVER, NOT_YET, N_ARC, N_BASE, N_FLOOR, N_LEFT, N_RIGHT, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT,
-    ON_RIGHT, OVER, R0, REFUSED, S, SPIN, STAY, STEM, STOP, SURE, T, TRIES, T_LOW, VX, VY, WALL, WHEN, X, Y,
-    Place,
-)  # fmt: skip
+from fast.kernel.records import CAP, MUSHROOM, STEM, Place
 
 ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
 CLEARLY_BEYOND = 1.05 * 1.05  # (L / (w v))^2 from which a particle moves to the disk's pool
@@ -57,8 +52,8 @@ class Outset(NamedTuple):
 @packed
 def outset_of(a, i):
     """Return the particle of a lane."""
-    x, y, vx, vy = a[X + i], a[Y + i], a[VX + i], a[VY + i]
-    return Outset(x, y, vx, vy, a[WALL + i], fma(x, vx, y * vy), fma(vx, vx, vy * vy))
+    x, y, vx, vy = a[rows.X + i], a[rows.Y + i], a[rows.VX + i], a[rows.VY + i]
+    return Outset(x, y, vx, vy, a[rows.WALL + i], fma(x, vx, y * vy), fma(vx, vx, vy * vy))
 
 
 @part
@@ -109,14 +104,14 @@ def nearest_below(outset, now, slope):
     """
     x, y, vx, vy, wall, _, _ = outset
     edge, drift = fma(now.m, y, now.w), fma(now.m, vy, side_rate(y, now, slope))
-    f_r = 0.0 if wall == ON_RIGHT else edge - x
+    f_r = 0.0 if wall == rows.ON_RIGHT else edge - x
     d_r = vx - drift
-    f_l = 0.0 if wall == ON_LEFT else edge + x
-    f_f = 0.0 if wall == ON_FLOOR else y + now.h
+    f_l = 0.0 if wall == rows.ON_LEFT else edge + x
+    f_f = 0.0 if wall == rows.ON_FLOOR else y + now.h
     f = f_r if f_r > 0.0 else 1.0
     d = d_r if f_r > 0.0 else 0.0
-    f, d, side = nearer(f, d if d > 0.0 else 0.0, ON_RIGHT, f_l, -vx - drift, ON_LEFT)
-    return nearer(f, d, side, f_f, -vy - now.h1, ON_FLOOR)
+    f, d, side = nearer(f, d if d > 0.0 else 0.0, rows.ON_RIGHT, f_l, -vx - drift, rows.ON_LEFT)
+    return nearer(f, d, side, f_f, -vy - now.h1, rows.ON_FLOOR)
 
 
 @part
@@ -127,7 +122,7 @@ def arc_quotient(outset, r0, r1, r2):
     """
     x, y, _, _, wall, q, v2 = outset
     c = fma(-x, x, (r0 - y) * (r0 + y))
-    c = 0.0 if wall == ON_ARC else c
+    c = 0.0 if wall == rows.ON_ARC else c
     a2 = v2 - fma(r1, r1, r0 * r2)
     b = fma(-r0, r1, q)
     root = np.sqrt(fma(b, b, a2 * c))
@@ -141,12 +136,12 @@ def cube_of_arc(r0, r1, r2, r3):
 
 
 @packed
-def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
+def aim(a, i, is_stem, is_relative, waves, slope, form, limits):
     """Choose a lane's wall and guess the time, walls moving at their speed now; returns the time.
 
     SURE is positive only where the part of the flight before y = 0 is as chosen: docs/lanes.md.
     """
-    outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, degree)
+    outset, now = outset_of(a, i), laws_in(a, rows.R0 + i, waves, is_relative, slope, form)
     _, y, _, vy, wall, _, _ = outset
     depth, rise = abs(y), abs(vy)
     is_in_cap = 1.0 if wall < 1.5 else 0.0
@@ -159,23 +154,23 @@ def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
     # Which of them, by the part of the table the flight is in and whether it crosses y = 0 before.
     reaches = fma(y, d_a, vy * f_a) if vy < 0.0 else 1.0  # cap: > 0 where the arc comes first
     stays = fma(depth, d, -f * vy) if vy > 0.0 else 1.0  # stem: > 0 where a side comes first
-    top = ON_BASE if is_stem else ON_ARC
-    below = side if gap > 0.0 else ON_BASE
-    from_cap = ON_ARC if reaches > 0.0 else below
+    top = rows.ON_BASE if is_stem else rows.ON_ARC
+    below = side if gap > 0.0 else rows.ON_BASE
+    from_cap = rows.ON_ARC if reaches > 0.0 else below
     from_stem = side if stays > 0.0 else top
     hit = from_cap if is_in_cap > 0.5 else from_stem
-    f = f_a if hit == ON_ARC else f
-    d = d_a if hit == ON_ARC else d
-    f = depth if hit == ON_BASE else f
-    d = rise if hit == ON_BASE else d
+    f = f_a if hit == rows.ON_ARC else f
+    d = d_a if hit == rows.ON_ARC else d
+    f = depth if hit == rows.ON_BASE else f
+    d = rise if hit == rows.ON_BASE else d
     # One division for 1 / d and 1 / root.
-    root = root if hit == ON_ARC else 1.0
+    root = root if hit == rows.ON_ARC else 1.0
     inverse = ONE / (d * root)
     s = f * (root * inverse)
     # What is beyond the straight line, or beyond second order at the arc.
-    beyond = now.h2 if hit == ON_FLOOR else side_bend(y, vy, now, slope)
-    beyond = beyond if hit >= ON_LEFT else 0.0
-    beyond = beyond * s if hit != ON_ARC else cube_of_arc(now.r, now.r1, now.r2, now.r3) * s * s * d
+    beyond = now.h2 if hit == rows.ON_FLOOR else side_bend(y, vy, now, slope)
+    beyond = beyond if hit >= rows.ON_LEFT else 0.0
+    beyond = beyond * s if hit != rows.ON_ARC else cube_of_arc(now.r, now.r1, now.r2, now.r3) * s * s * d
     s = s * fma(0.5 * beyond, inverse, 1.0)
     # Comparisons so put that what is no number is never sure.
     whole = reaches if is_in_cap > 0.5 else stays
@@ -183,8 +178,8 @@ def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
     sure = abs(gap) - doubt if is_in_cap > 0.5 else gap - doubt
     sure = 1.0 if is_stem else sure
     sure = 1.0 if whole > 0.0 else sure
-    s = a[S + i] if a[TRIES + i] > 0.0 else s
-    a[HIT + i], a[S + i], a[SURE + i] = hit, s, sure
+    s = a[rows.S + i] if a[rows.TRIES + i] > 0.0 else s
+    a[rows.HIT + i], a[rows.S + i], a[rows.SURE + i] = hit, s, sure
     return s
 
 
@@ -250,12 +245,12 @@ def off_the_wall(hit, place, vx, vy, at_hit, slope):
     """Return the velocity after a hit, v - 2 f' grad f / |grad f|^2, by the laws at the hit."""
     off_x, off_y = off_the_arc(place, vx, vy, at_hit.r, at_hit.r1)
     m, rate = (at_hit.m, fma(at_hit.m1, place.y, at_hit.w1)) if slope is None else (slope, at_hit.w1)
-    vx_s, vy_s = off_the_side(1.0 if hit == ON_RIGHT else -1.0, vx, vy, m, rate)
-    vx_s = vx if hit == ON_FLOOR else vx_s
-    vy_s = -vy - 2.0 * at_hit.h1 if hit == ON_FLOOR else vy_s
-    vx_s = vx if hit == ON_BASE else vx_s
-    vy_s = -vy if hit == ON_BASE else vy_s
-    return off_x if hit == ON_ARC else vx_s, off_y if hit == ON_ARC else vy_s
+    vx_s, vy_s = off_the_side(1.0 if hit == rows.ON_RIGHT else -1.0, vx, vy, m, rate)
+    vx_s = vx if hit == rows.ON_FLOOR else vx_s
+    vy_s = -vy - 2.0 * at_hit.h1 if hit == rows.ON_FLOOR else vy_s
+    vx_s = vx if hit == rows.ON_BASE else vx_s
+    vy_s = -vy if hit == rows.ON_BASE else vy_s
+    return off_x if hit == rows.ON_ARC else vx_s, off_y if hit == rows.ON_ARC else vy_s
 
 
 @packed
@@ -266,21 +261,21 @@ def stay_after(stay, hit, place, v, w):
     """
     vx, vy, v2 = v
     spin, edge = fma(place.x, vy, -place.y * vx), w * w * v2
-    at_arc = min(stay, OVER)
-    at_arc = CAPTURED if spin * spin > edge else at_arc
-    at_arc = CLEARLY if spin * spin > CLEARLY_BEYOND * edge else at_arc
-    after = at_arc if hit == ON_ARC else stay
-    return NOT_YET if hit >= ON_LEFT else after
+    at_arc = min(stay, rows.OVER)
+    at_arc = rows.CAPTURED if spin * spin > edge else at_arc
+    at_arc = rows.CLEARLY if spin * spin > CLEARLY_BEYOND * edge else at_arc
+    after = at_arc if hit == rows.ON_ARC else stay
+    return rows.NOT_YET if hit >= rows.ON_LEFT else after
 
 
 @packed
 def count_hit(a, i, hit):
     """Count a hit of a wall."""
-    a[N_ARC + i] += 1.0 if hit == ON_ARC else 0.0
-    a[N_BASE + i] += 1.0 if hit == ON_BASE else 0.0
-    a[N_LEFT + i] += 1.0 if hit == ON_LEFT else 0.0
-    a[N_RIGHT + i] += 1.0 if hit == ON_RIGHT else 0.0
-    a[N_FLOOR + i] += 1.0 if hit == ON_FLOOR else 0.0
+    a[rows.N_ARC + i] += 1.0 if hit == rows.ON_ARC else 0.0
+    a[rows.N_BASE + i] += 1.0 if hit == rows.ON_BASE else 0.0
+    a[rows.N_LEFT + i] += 1.0 if hit == rows.ON_LEFT else 0.0
+    a[rows.N_RIGHT + i] += 1.0 if hit == rows.ON_RIGHT else 0.0
+    a[rows.N_FLOOR + i] += 1.0 if hit == rows.ON_FLOOR else 0.0
 
 
 @packed
@@ -313,11 +308,11 @@ def at_side_or_floor(hit, outset, place, stem, slope):
     """Return f and f' of the side or the floor that is met."""
     (_, _, vx, vy, _, _, _), (x_s, x_low, y_s, y_low) = outset, place
     w, m = stem.w, stem.m
-    sign = 1.0 if hit == ON_RIGHT else -1.0
+    sign = 1.0 if hit == rows.ON_RIGHT else -1.0
     f = (w - sign * x_s) + fma(m, y_s, fma(m, y_low, fma(-sign, x_low, stem.w_low)))
     rate = fma(-sign, vx, fma(m, vy, side_rate(y_s, stem, slope)))
-    f = (y_s + stem.h) + y_low if hit == ON_FLOOR else f
-    rate = vy + stem.h1 if hit == ON_FLOOR else rate
+    f = (y_s + stem.h) + y_low if hit == rows.ON_FLOOR else f
+    rate = vy + stem.h1 if hit == rows.ON_FLOOR else rate
     return f, rate
 
 
@@ -327,18 +322,18 @@ def told_slope(hit, m, vx, vy, limits):
     steepest = limits.lean - 1.0
     aslant = min(abs(vy) - steepest * abs(vx), abs(vx) - steepest * abs(vy))
     told = max(abs(m) - 0.25 * steepest, aslant)
-    return told if hit >= ON_LEFT and hit != ON_FLOOR else 1.0
+    return told if hit >= rows.ON_LEFT and hit != rows.ON_FLOOR else 1.0
 
 
 @part
-def along_arc(a, i, s, outset, there, waves, degree, limits):
+def along_arc(a, i, s, outset, there, waves, form, limits):
     """Return f of the arc that was left, f', the summed sizes of the terms of half of f', and what is known.
 
     f is found by its increments since. The last number is the lesser of `known` and `told` of docs/lanes.md:
     positive where the radius is known at both ends of a hop, which hangs on r' no more than on what enters.
     """
     x, y, vx, vy, _, q, v2 = outset
-    r0, dr, known = radius_since(a, i, s, waves, degree)
+    r0, dr, known = radius_since(a, i, s, waves, form)
     f = fma(dr, fma(2.0, r0, dr), -s * fma(s, v2, 2.0 * q))
     rate = 2.0 * fma(there.r, there.r1, -fma(s, v2, q))
     sizes = fma(abs(x), abs(vx), fma(abs(y), abs(vy), fma(s, v2, there.r * limits.rate)))
@@ -352,7 +347,7 @@ def left_in_place(error, hit, vx, vy, r):
 
     That is so after flights that are many radii long.
     """
-    return NEVER if hit == ON_ARC and error * (abs(vx) + abs(vy)) > 16.0 * r else error
+    return rows.NEVER if hit == rows.ON_ARC and error * (abs(vx) + abs(vy)) > 16.0 * r else error
 
 
 @part
@@ -374,9 +369,9 @@ def clearance(hit, place, stem, far):
     """Return `clear` of docs/lanes.md: how far inside the walls below that are not met a flight ends."""
     (x_s, _, y_s, _), w, h, m = place, stem.w, stem.h, stem.m
     edge = fma(m, y_s, w)
-    clear_r = edge - x_s if hit != ON_RIGHT else NEVER
-    clear_l = edge + x_s if hit != ON_LEFT else NEVER
-    clear_f = y_s + h if hit != ON_FLOOR else NEVER
+    clear_r = edge - x_s if hit != rows.ON_RIGHT else rows.NEVER
+    clear_l = edge + x_s if hit != rows.ON_LEFT else rows.NEVER
+    clear_f = y_s + h if hit != rows.ON_FLOOR else rows.NEVER
     return min(clear_r, min(clear_l, clear_f)) - far
 
 
@@ -386,11 +381,11 @@ def place_on_wall(hit, outset, end, r, is_stem, slack, blur):
 
     The arc is met above y = 0, sides and floor below it, the base inside the arc.
     """
-    place = end.y if hit == ON_ARC else -end.y
+    place = end.y if hit == rows.ON_ARC else -end.y
     place -= fma(abs(outset.vy), slack, blur)
     inside = (r - abs(end.x)) - blur
     inside = 1.0 if is_stem else inside
-    return inside if hit == ON_BASE else place
+    return inside if hit == rows.ON_BASE else place
 
 
 @part
@@ -398,18 +393,18 @@ def way_out(hit, s, outset, slope, k_side, sizes, limits):
     """Return `first` of docs/lanes.md: positive where the wall is met on the way out."""
     vx, vy = outset.vx, outset.vy
     first = -slope - fma(k_side, s, SAFETY * (fma(limits.lean, abs(vy), abs(vx)) + limits.rate))
-    first = fma(-2.0 * SAFETY, sizes, -slope) if hit == ON_ARC else first
-    return 1.0 if hit == ON_BASE else first
+    first = fma(-2.0 * SAFETY, sizes, -slope) if hit == rows.ON_ARC else first
+    return 1.0 if hit == rows.ON_BASE else first
 
 
 @part
 def verdict(quality, ahead, s, error, tries):
     """Return what is known of a flight: LATE for a right one, COARSE, REFUSED, which nan comes to, or FAR."""
-    result = COARSE if tries < MAX_CORRECTIONS else REFUSED
-    result = LATE if error < s else result
-    result = result if quality > 0.0 else REFUSED
-    result = result if s < NEVER else REFUSED
-    return FAR if ahead <= 0.0 else result
+    result = rows.COARSE if tries < rows.MAX_CORRECTIONS else rows.REFUSED
+    result = rows.LATE if error < s else result
+    result = result if quality > 0.0 else rows.REFUSED
+    result = result if s < rows.NEVER else rows.REFUSED
+    return rows.FAR if ahead <= 0.0 else result
 
 
 @part
@@ -423,52 +418,52 @@ def laws_at_hit(there, delta):
 
 
 @packed
-def land(a, i, table, waves, slope, degree, limits):
+def land(a, i, table, waves, slope, form, limits):
     """Correct a lane's time of flight once, and tell whether the step is then right; if so, take it.
 
     `table` tells whether it is a stem, whether captures are wanted, and whether the width is given as nu.
     """
     is_stem, has_captures, is_relative = table
     bend = limits.bend
-    outset, hit, s = outset_of(a, i), a[HIT + i], a[S + i]
+    outset, hit, s = outset_of(a, i), a[rows.HIT + i], a[rows.S + i]
     x, y, vx, vy, wall, _, v2 = outset
-    there = laws_in(a, AHEAD + i, waves, is_relative, slope, degree)
+    there = laws_in(a, rows.AHEAD + i, waves, is_relative, slope, form)
     r = there.r
-    hop, arc_rate, sizes, known = along_arc(a, i, s, outset, there, waves, degree, limits)
+    hop, arc_rate, sizes, known = along_arc(a, i, s, outset, there, waves, form, limits)
     k_side = side_curvature(vy, slope, limits)
     end = place_after(s, x, y, vx, vy)
     x_s, x_low, y_s, y_low = end
     f, rate = at_side_or_floor(hit, outset, end, there, slope)
     # The arc: its increments if it was left, else what is there.
     f_arc = fma(-2.0, fma(x_s, x_low, y_s * y_low), fma(-x_s, x_s, (r - y_s) * (r + y_s)))
-    f_arc = hop if wall == ON_ARC else f_arc
-    f = f_arc if hit == ON_ARC else f
-    rate = arc_rate if hit == ON_ARC else rate
-    half_bend = bend + v2 if hit == ON_ARC else 0.5 * k_side
-    f = y_s + y_low if hit == ON_BASE else f
-    rate = vy if hit == ON_BASE else rate
-    half_bend = 0.0 if hit == ON_BASE else half_bend
+    f_arc = hop if wall == rows.ON_ARC else f_arc
+    f = f_arc if hit == rows.ON_ARC else f
+    rate = arc_rate if hit == rows.ON_ARC else rate
+    half_bend = bend + v2 if hit == rows.ON_ARC else 0.5 * k_side
+    f = y_s + y_low if hit == rows.ON_BASE else f
+    rate = vy if hit == rows.ON_BASE else rate
+    half_bend = 0.0 if hit == rows.ON_BASE else half_bend
     inverse = ONE / rate
     delta = -f * inverse
     error = error_left(half_bend * inverse, s, delta, waves)
     error = left_in_place(error, hit, vx, vy, r)
     blur = SAFETY * fma(abs(vx) + abs(vy), s, limits.size + abs(x) + abs(y))
-    slack = slack_of(s, blur * (16.0 * r) if hit == ON_ARC else blur, delta, inverse, error)
+    slack = slack_of(s, blur * (16.0 * r) if hit == rows.ON_ARC else blur, delta, inverse, error)
     # The others are not reached: see the error analysis. The mouth was looked at.
     clear = clearance(hit, end, there, far_enough(s, outset, k_side, slack, blur, limits))
-    quality = min(a[SURE + i], clear if hit >= (ON_ARC if is_stem else ON_LEFT) else 1.0)
+    quality = min(a[rows.SURE + i], clear if hit >= (rows.ON_ARC if is_stem else rows.ON_LEFT) else 1.0)
     place = place_on_wall(hit, outset, end, r, is_stem, slack, blur)
     first = way_out(hit, s, outset, rate, k_side, sizes, limits)
     quality = min(min(quality, place), min(first, s))
     # The arc's function must be concave, and a bounce hang on a rate no more than on what enters.
-    pushed = (abs(vy) if hit == ON_FLOOR else abs(vx)) - limits.rate if hit >= ON_LEFT else 1.0
+    pushed = (abs(vy) if hit == rows.ON_FLOOR else abs(vx)) - limits.rate if hit >= rows.ON_LEFT else 1.0
     quality = min(quality, min(v2 - bend, pushed))
     if slope is None:
         quality = min(quality, told_slope(hit, there.m, vx, vy, limits))
-    known = known if hit == ON_ARC else 1.0
-    quality = min(quality, known if wall == ON_ARC else 1.0)
+    known = known if hit == rows.ON_ARC else 1.0
+    quality = min(quality, known if wall == rows.ON_ARC else 1.0)
     within, ahead = room_ahead(a, i, s, delta, waves)
-    result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
+    result = verdict(quality, min(within, ahead), s, error, a[rows.TRIES + i])
     flight = Judged(s, delta, within, result)
     is_moved, at_hit = settle(a, i, flight, outset, end, there, has_captures, slope)
     if is_moved:
@@ -478,15 +473,15 @@ def land(a, i, table, waves, slope, degree, limits):
 @packed
 def settle(a, i, flight, outset, end, there, has_captures, slope):
     """Bounce off the wall that was met; returns whether the particle moves on, and the laws at the hit."""
-    hit, vx, vy, v2 = a[HIT + i], outset.vx, outset.vy, outset.v2
+    hit, vx, vy, v2 = a[rows.HIT + i], outset.vx, outset.vy, outset.v2
     t, t_low, at, at_hit, is_moved = arrive(a, i, flight, outset, end, there)
-    at = Place(at.x, at.x_low, 0.0 if hit == ON_BASE else at.y, at.y_low)
+    at = Place(at.x, at.x_low, 0.0 if hit == rows.ON_BASE else at.y, at.y_low)
     vx_s, vy_s = off_the_wall(hit, at, vx, vy, at_hit, slope)
-    stay = stay_after(a[STAY + i], hit, at, (vx, vy, v2), at_hit.w) if has_captures else a[STAY + i]
-    is_quiet = stay == a[STAY + i]
+    stay = stay_after(a[rows.STAY + i], hit, at, (vx, vy, v2), at_hit.w) if has_captures else a[rows.STAY + i]
+    is_quiet = stay == a[rows.STAY + i]
     if is_moved:
         count_hit(a, i, hit)
-        a[STAY + i], a[WALL + i] = stay, hit
+        a[rows.STAY + i], a[rows.WALL + i] = stay, hit
     move(a, i, flight, is_moved, is_quiet, (t, t_low, at.x, at.y, vx_s, vy_s))
     return is_moved, at_hit
 
@@ -494,11 +489,11 @@ def settle(a, i, flight, outset, end, there, has_captures, slope):
 @part
 def arrive(a, i, flight, outset, end, there):
     """Return time, place and laws at the end of a flight, and whether the particle moves on to there."""
-    t, low = two_sum(a[T + i], flight.s)
-    t, t_low = short_sum(t, low + (a[T_LOW + i] + flight.delta))
+    t, low = two_sum(a[rows.T + i], flight.s)
+    t, t_low = short_sum(t, low + (a[rows.T_LOW + i] + flight.delta))
     x_s, x_low = short_sum(end.x, fma(outset.vx, flight.delta, end.x_low))
     y_s, y_low = short_sum(end.y, fma(outset.vy, flight.delta, end.y_low))
-    is_moved = t < a[STOP + i] if flight.result == LATE else False
+    is_moved = t < a[rows.STOP + i] if flight.result == rows.LATE else False
     return t, t_low, Place(x_s, x_low, y_s, y_low), laws_at_hit(there, flight.delta), is_moved
 
 
@@ -507,15 +502,22 @@ def move(a, i, flight, is_moved, is_quiet, state):
     """Take a state for the present one, where the particle moves on, and write what became of the flight."""
     s, delta, within, result = flight
     t, t_low, x, y, vx, vy = state
-    fate = MOVED if t < a[END + i] else MARKED
-    fate = fate if is_quiet else MARKED
-    a[FATE + i] = fate if is_moved else result
-    a[WHEN + i] = t
-    a[S + i] = s + delta if within > 0.0 else s  # from laws out of their reach nothing is learnt
-    tries = a[TRIES + i] + 1.0
-    a[TRIES + i] = tries if result == COARSE else (tries if result == FAR else 0.0)
+    fate = rows.MOVED if t < a[rows.END + i] else rows.MARKED
+    fate = fate if is_quiet else rows.MARKED
+    a[rows.FATE + i] = fate if is_moved else result
+    a[rows.WHEN + i] = t
+    a[rows.S + i] = s + delta if within > 0.0 else s  # from laws out of their reach nothing is learnt
+    tries = a[rows.TRIES + i] + 1.0
+    a[rows.TRIES + i] = tries if result == rows.COARSE else (tries if result == rows.FAR else 0.0)
     if is_moved:
-        a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i] = t, t_low, x, y, vx, vy
+        a[rows.T + i], a[rows.T_LOW + i], a[rows.X + i], a[rows.Y + i], a[rows.VX + i], a[rows.VY + i] = (
+            t,
+            t_low,
+            x,
+            y,
+            vx,
+            vy,
+        )
 
 
 @packed
@@ -528,21 +530,21 @@ def error_left(curvature, s, delta, waves):
 
 
 @packed
-def fly(a, n, scene, waves, slope, degree, limits):
+def fly(a, n, scene, waves, slope, form, limits):
     """Find the next collision of each lane, and take the step where it is shown right."""
     widest_registers()
     is_stem, is_relative = scene.table == STEM, scene.is_relative
     table = is_stem, scene.table == MUSHROOM, is_relative
     for i in range(n):
-        aim(a, i, is_stem, is_relative, waves, slope, degree, limits)
+        aim(a, i, is_stem, is_relative, waves, slope, form, limits)
     for i in range(n):
-        look_ahead(a, i, a[S + i], waves, is_relative, slope, degree)
+        look_ahead(a, i, a[rows.S + i], waves, is_relative, slope, form)
     for i in range(n):
-        land(a, i, table, waves, slope, degree, limits)
+        land(a, i, table, waves, slope, form, limits)
 
 
 @packed
-def chord(a, n, scene, waves, slope, degree, limits):
+def chord(a, n, scene, waves, slope, form, limits):
     """Find the next arc hit of captured particles: the base is unfolded, |L| is constant.
 
     The chord keeps the distance |L| / v from the centre; while that exceeds w the mouth is out of reach.
@@ -551,26 +553,26 @@ def chord(a, n, scene, waves, slope, degree, limits):
     bend, k_w, size = limits.bend, limits.curvature, limits.size
     is_cap, is_relative = scene.table == CAP, scene.is_relative
     for i in range(n):
-        outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, degree)
+        outset, now = outset_of(a, i), laws_in(a, rows.R0 + i, waves, is_relative, slope, form)
         inverse = ONE / (outset.v2 - fma(now.r1, now.r1, now.r * now.r2))
         s = 2.0 * fma(now.r, now.r1, -outset.q) * inverse
         s = s * fma(cube_of_arc(now.r, now.r1, now.r2, now.r3) * s, inverse, 1.0)
-        a[S + i] = a[S + i] if a[TRIES + i] > 0.0 else s
-        a[SURE + i] = now.w
+        a[rows.S + i] = a[rows.S + i] if a[rows.TRIES + i] > 0.0 else s
+        a[rows.SURE + i] = now.w
     for i in range(n):
-        look_ahead(a, i, a[S + i], waves, is_relative, slope, degree)
+        look_ahead(a, i, a[rows.S + i], waves, is_relative, slope, form)
     for i in range(n):
-        outset, spin = outset_of(a, i), a[SPIN + i]
+        outset, spin = outset_of(a, i), a[rows.SPIN + i]
         x, y, vx, vy, _, _, v2 = outset
-        s = a[S + i]
-        there = laws_in(a, AHEAD + i, waves, is_relative, slope, degree)
-        f, rate, sizes, known = along_arc(a, i, s, outset, there, waves, degree, limits)
+        s = a[rows.S + i]
+        there = laws_in(a, rows.AHEAD + i, waves, is_relative, slope, form)
+        f, rate, sizes, known = along_arc(a, i, s, outset, there, waves, form, limits)
         inverse = ONE / rate
         delta = -f * inverse
         error = error_left((bend + v2) * inverse, s, delta, waves)
         end = place_after(s, x, y, vx, vy)
         # The widest that the mouth can be during the flight, from both ends.
-        reach = max(a[SURE + i], there.w) + fma(k_w * s, s, SAFETY * size)
+        reach = max(a[rows.SURE + i], there.w) + fma(k_w * s, s, SAFETY * size)
         clear = spin * spin - (1.0 + 4.0 * SAFETY) * reach * reach * v2
         clear = 1.0 if is_cap else clear
         first = -rate - 2.0 * SAFETY * sizes
@@ -579,7 +581,7 @@ def chord(a, n, scene, waves, slope, degree, limits):
         quality = min(min(clear, place), min(first, v2 - bend))
         quality = min(min(quality, s), known)
         within, ahead = room_ahead(a, i, s, delta, waves)
-        result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
+        result = verdict(quality, min(within, ahead), s, error, a[rows.TRIES + i])
         flight = Judged(s, delta, within, result)
         t, t_low, at, at_hit, is_moved = arrive(a, i, flight, outset, end, there)
         # The angular momentum of the whole stay is constant to the bit.
@@ -587,8 +589,8 @@ def chord(a, n, scene, waves, slope, degree, limits):
         # A chord that crosses y = 0 hits the base.
         crossed = 1.0 if y * at.y < 0.0 else 0.0
         if is_moved:
-            a[N_ARC + i] += 1.0
-            a[N_BASE + i] += crossed
+            a[rows.N_ARC + i] += 1.0
+            a[rows.N_BASE + i] += crossed
         move(a, i, flight, is_moved, True, (t, t_low, at.x, at.y, vx_s, vy_s))
         if is_moved:
             move_laws(a, i, delta, at_hit, waves, slope)

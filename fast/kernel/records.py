@@ -12,17 +12,36 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast.kernel.compiling import kernel, part
+from fast.kernel.compiling import kernel
+from fast.kernel.fates import Fate
 
 NO_WALL, ARC, BASE, LEFT, RIGHT, FLOOR = np.arange(-1, 5)
 N_WALLS = 5
-HORIZON, SLIDING, MOUTH_EDGE, ON_CORNER = np.array([10, 20, 21, 22])
-FAR_TIME, TOO_MANY, TANGENT, CORNER, EDGE, START, AT_END, TOO_FAR = np.arange(31, 39)
-# A refused state moves into the wall that it leaves, or lies beyond a wall: BEYOND plus that wall's code; or
-# it is off the wall that it names. ANEW is no end: a particle that cannot go on from where it was kept, and
-# is to be followed from its start. A BAD_QUESTION is refused. ANSWER_LOST: a number of the answer does not
-# fit into binary64.
-APPROACHING, BEYOND, ANEW, OFF_WALL, BAD_QUESTION, ANSWER_LOST = np.array([40, 41, 50, 52, 53, 54])
+
+
+def code_of(fate: Fate) -> np.int64:
+    """Return a fate's code as kernels take it."""
+    return np.int64(fate.code)
+
+
+HORIZON = code_of(Fate.HORIZON)
+SLIDING = code_of(Fate.SLIDING)
+MOUTH_EDGE = code_of(Fate.MOUTH_EDGE)
+CORNER = code_of(Fate.CORNER)
+TOO_LATE = code_of(Fate.TOO_LATE)
+TOO_MANY_PARABOLAS = code_of(Fate.TOO_MANY_PARABOLAS)
+NEAR_TANGENCY = code_of(Fate.NEAR_TANGENCY)
+NEAR_CORNER = code_of(Fate.NEAR_CORNER)
+NEAR_MOUTH_EDGE = code_of(Fate.NEAR_MOUTH_EDGE)
+NEAR_START = code_of(Fate.NEAR_START)
+NEAR_HORIZON = code_of(Fate.NEAR_HORIZON)
+TOO_FAR = code_of(Fate.TOO_FAR)
+ANSWER_LOST = code_of(Fate.ANSWER_LOST)
+APPROACHING = code_of(Fate.APPROACHING)
+BEYOND_ARC = code_of(Fate.BEYOND_ARC)
+OFF_WALL = code_of(Fate.OFF_WALL)
+BAD_QUESTION = code_of(Fate.BAD_QUESTION)
+FOLLOW_ANEW = code_of(Fate.FOLLOW_ANEW)
 CAP, STEM, MUSHROOM = np.arange(3)
 
 
@@ -65,53 +84,6 @@ TURN_TIME, IS_SHORT = np.arange(2)
 SINE, COSINE = 3, 3 + MAX_HARMONICS
 SINE_LOW, COSINE_LOW = 3 + 2 * MAX_HARMONICS, 3 + 3 * MAX_HARMONICS
 ANCHORS_SHAPE = (6, 4 + 4 * MAX_HARMONICS)
-
-
-# A pool holds particles side by side, one in each lane.
-LANES = 128
-# How far rows are apart. Were it a divisor of 4096 bytes, rows would meet in few sets of the cache, and a
-# load would wait for stores to rows whose addresses end alike.
-STRIDE = 136
-NEVER = np.inf
-
-# Rows of a pool, in one flat array: constant strides let the loops vectorise.
-(
-    T, T_LOW, X, Y, VX, VY, WALL, SPIN,  # state after the last collision; angular momentum when captured
-    SINCE, UNTIL, STAY_IN, STAY_OUT,  # a capture interval over an instant between is kept; begin, end
-    N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
-    # The laws at T. As waves: sine and cosine of the fundamental phase. As pieces: the reference time and
-    # number of the piece; radius, half-width, depth and slope, each with derivatives.
-    REF, REF_LOW, PIECE,
-    R0, R1, R2, R3, W0, W1, W2, H0, H1, H2, M0, M1, M2, W0_LOW,
-    AS_GIVEN,  # 1 where its distance from the arc is still that of a start that names it; hops keep it
-    STOP,  # a collision at or after this time is left to `attend`
-    END,  # until when the laws are known; minus infinity where they are not
-    LIMIT, BACK,  # how long after the reference time a piece holds, and before it for a hop along the arc
-    HIT, SURE, S, TRIES,  # the flight: wall, mouth, time; how often the time has been corrected
-    FATE, WHEN,  # what became of it, and its time
-    STAY,  # of a free particle: whether it is captured
-    # The laws where the flight is guessed to end, in as many rows as those at T; with pieces the flight's
-    # begin since REF too, and the radius's mean rate.
-    AHEAD, _, _, _, _, _, _, _, _, _, _, _, _, _,
-    BEFORE, MEAN_RATE,
-    LAWS,  # from here on the coefficients of a piece: see Pieces.coefficients
-) = STRIDE * np.arange(63)  # fmt: skip
-PHASE_SINE, PHASE_COSINE = R0, R1
-N_COEFFICIENTS = 16  # of each law, as many as the highest degree asks for
-N_ROWS = 62 + 4 * N_COEFFICIENTS
-RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * np.arange(4)
-# Codes of walls as they stand in a row.
-ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
-# Whether a particle is captured in its stay in the cap: not yet, no longer, or yes; and the last, clearly so,
-# just now. A stay counts as captured from its first hit of the arc with |sin phi| > nu to that which ends it.
-NOT_YET, OVER, CAPTURED, CLEARLY = 0.0, 1.0, 2.0, 3.0
-# What became of a flight. The particle is where it was: the end is out of the laws' reach; not shown right;
-# right, and at STOP or later. Or it has moved on, and `attend` is to look at it. Or nothing is to be done, as
-# it has moved on, or as its time is to be corrected once more.
-FAR, REFUSED, LATE, MARKED, MOVED, COARSE = -1.0, 0.0, 1.0, 2.0, 3.0, 4.0
-MAX_CORRECTIONS = 3.0
-POOL_SIZE = np.int64(N_ROWS * STRIDE)
-REGISTER = np.int64(8)  # lanes of the widest registers
 
 
 class Compiled(NamedTuple):
@@ -208,7 +180,9 @@ class LawsInLanes(NamedTuple):
         limits: what holds of its laws for all time.
         pieces: its laws as polynomials; of waves their period alone, and up to when they are known.
         waves: its laws as waves.
-        degree: of the polynomials, PARABOLA or SERIES of fast.kernel.lane_laws; or ONE_WAVE or TWO_WAVES.
+        form: ONE_WAVE, TWO_WAVES, PARABOLA or SERIES of fast.kernel.lane_laws; those of pieces are the
+            polynomials' degree.
+        is_waves: the form is one of waves.
         is_slope_moving: the slope of the sides moves.
         slope: what it is where it stands still.
     """
@@ -217,7 +191,8 @@ class LawsInLanes(NamedTuple):
     limits: LawLimits
     pieces: Pieces
     waves: LaneWaves
-    degree: int
+    form: int
+    is_waves: bool
     is_slope_moving: bool
     slope: float
 
@@ -326,6 +301,18 @@ def unfilled_ends(
 
 
 @kernel
+def is_hit(code):
+    """Tell whether a step's code is that of a wall that is met, or NO_WALL."""
+    return code < HORIZON
+
+
+@kernel
+def is_lost(code):
+    """Tell whether a step's code is that of a particle that neither meets a wall nor reaches the horizon."""
+    return code > HORIZON
+
+
+@kernel
 def particle_at(states, i, wall):
     """Return the particle whose state is a row of `states`."""
     return Particle(states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4], states[i, 5], wall)
@@ -360,57 +347,3 @@ def write_step(steps, i, factors, dt, particle):
 def released(particle):
     """Return the particle as one that is on no wall."""
     return Particle(particle.t, particle.t_low, particle.x, particle.y, particle.vx, particle.vy, NO_WALL)
-
-
-@part
-def whole_registers(n):
-    """Return the number of lanes rounded up to whole registers: what they hold too many is not looked at.
-
-    One lane alone is left alone: what is done for it is then not packed, and roots and quotients come sooner.
-    """
-    return n if n == 1 else (n + REGISTER - 1) // REGISTER * REGISTER
-
-
-@part
-def load(a, i, particle, is_first_kept):
-    """Put a particle into a lane; its laws are unknown there, so its first step will be careful."""
-    for row in range(N_ROWS):
-        a[row * STRIDE + i] = 0.0
-    put_particle(a, i, particle)
-    a[WALL + i] = particle.wall
-    a[AS_GIVEN + i] = 1.0 if particle.wall == ARC else 0.0
-    # Any stay serves, or none until the mouth has narrowed.
-    any_serves = -NEVER if is_first_kept else NEVER
-    a[SINCE + i], a[UNTIL + i] = any_serves, -any_serves
-    a[STAY_IN + i] = a[STAY_OUT + i] = NEVER
-    a[STOP + i] = a[END + i] = -NEVER
-
-
-@part
-def particle_of(a, i):
-    """Return a lane's particle."""
-    return Particle(a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i], int(a[WALL + i]))
-
-
-@part
-def put_particle(a, i, p):
-    """Write a particle's state into a lane, but for its wall."""
-    a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i] = p.t, p.t_low, p.x, p.y, p.vx, p.vy
-
-
-@kernel
-def copy_rows(a, i, b, j, first, last):
-    """Copy what lane i of one pool holds to lane j of another, from one row up to another."""
-    for row in range(first, last, STRIDE):
-        b[row + j] = a[row + i]
-
-
-@part
-def refold(a, i):
-    """Bring an unfolded particle back to y >= 0; its wall is known since it first hit the arc.
-
-    One that is below y = 0 as it leaves the base was given so, within what a start may be off its wall.
-    """
-    if a[Y + i] < 0.0 and a[WALL + i] == ON_ARC:
-        a[Y + i], a[VY + i] = -a[Y + i], -a[VY + i]
-    a[SPIN + i] = 0.0

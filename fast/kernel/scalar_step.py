@@ -21,12 +21,14 @@ import numpy as np
 
 from fast.kernel.arithmetic import SAFETY, fma, two_product, two_sum
 from fast.kernel.compiling import HOW, kept, kernel, part
+from fast.kernel.fates import MAX_PARABOLAS
 from fast.kernel.laws import phase_room, set_anchors
 
 from fast.kernel.records import (  # isort: skip
-    APPROACHING, ARC, AT_END, BASE, BEND, BEYOND, CAP, CORNER, DEPTH, EDGE, FAR_TIME, FLOOR, HORIZON, LEFT,
-    MOUTH_EDGE, MUSHROOM, NO_WALL, OFF_WALL, ON_CORNER, PHASE, PHASE_ERROR, RADIUS, RATE, RIGHT, SLIDING,
-    SLOPE, START, STEM, TANGENT, TOO_MANY, VALUE, VALUE_LOW, WIDTH, Particle, Place, released,
+    APPROACHING, ARC, BASE, BEND, BEYOND_ARC, CAP, CORNER, DEPTH, FLOOR, HORIZON, LEFT,
+    MOUTH_EDGE, MUSHROOM, NEAR_CORNER, NEAR_HORIZON, NEAR_MOUTH_EDGE, NEAR_START, NEAR_TANGENCY,
+    NO_WALL, OFF_WALL, PHASE, PHASE_ERROR, RADIUS, RATE, RIGHT, SLIDING, SLOPE, STEM, TOO_LATE,
+    TOO_MANY_PARABOLAS, VALUE, VALUE_LOW, WIDTH, Particle, Place, is_hit, is_lost, released,
 )  # fmt: skip
 from fast.kernel.walls import (  # isort: skip
     crossed_wall, curvature_bounds, law_size, off_the_arc, reach_time, side_of_mouth, wall_function,
@@ -35,7 +37,6 @@ from fast.kernel.walls import (  # isort: skip
 
 from scene.states import ON_WALL
 
-MAX_PARABOLAS = 1_000_000
 LEAST = 2.0**-1022  # a time in which nothing is met
 NEAR = 2.0**-30  # how much beyond the limit hits are looked for, relatively
 BEFORE = 1.0 - 2.0**-52  # of a sum, so that it is not rounded up: a leg may be shorter than its last place
@@ -109,7 +110,7 @@ def first_root(wall, start, limit, particle, scene, anchors):
         if s >= limit:
             return NO_WALL, limit, 0.0, 0.0
         if s > known:
-            return FAR_TIME, s, 0.0, 0.0
+            return TOO_LATE, s, 0.0, 0.0
         f, slope, error, slope_error = wall_function(wall, s, particle, residual, scene, anchors)
         error += residual_error
         if s == 0.0 and is_leaving:
@@ -119,14 +120,14 @@ def first_root(wall, start, limit, particle, scene, anchors):
                 # With slope and curvature exactly 0 the path runs along a wall that stands still; by the rule
                 # of docs/proof.md that is sliding where nothing moves, and else a tangency.
                 is_along = slope == 0.0 and slope_error == 0.0 and is_at_rest(scene)
-                return (SLIDING if is_along else TANGENT), s, slope, 0.0
+                return (SLIDING if is_along else NEAR_TANGENCY), s, slope, 0.0
             f = 0.0
         elif s == start and f <= error + doubt:
-            return (BEYOND + wall if f < -(error + doubt) else START), s, slope, 0.0
+            return (BEYOND_ARC + wall if f < -(error + doubt) else NEAR_START), s, slope, 0.0
         elif f <= error:
             # A simple root from above. Were f convex enough to turn back within its error: undecided.
             if slope >= -slope_error or (up > 0.0 and slope * slope <= 4.0 * up * error):
-                return TANGENT, s, slope, 0.0
+                return NEAR_TANGENCY, s, slope, 0.0
             return root_before(limit, wall, s - f / slope, slope, error / -slope)
         h = parabola_root(f, slope, down)
         if h == np.inf:
@@ -140,11 +141,11 @@ def first_root(wall, start, limit, particle, scene, anchors):
         moved = s + h
         # Where h is less than the last place of s, rounded up, a wall might come and go in between.
         if moved <= s or (h < 2.0**-51 * s and moved - s > h):
-            return TANGENT, s, slope, 0.0
+            return NEAR_TANGENCY, s, slope, 0.0
         if n_steps >= PARABOLAS_BEFORE_REACH:
             moved = reached_at_least(wall, s, f, slope, moved, particle, scene, anchors)
         s = moved
-    return TOO_MANY, s, 0.0, 0.0
+    return TOO_MANY_PARABOLAS, s, 0.0, 0.0
 
 
 @kernel
@@ -163,7 +164,7 @@ def earliest_side_or_floor(start, limit, particle, scene, anchors):
             code, s, error = found, min(root, s), 0.0
         elif code != NO_WALL and abs(root - s) <= 8.0 * (error + root_error) + SAFETY * s:
             # A tie, unless a wall still to be tried is met before it.
-            code, s, error = CORNER, min(root, s), max(error, root_error)
+            code, s, error = NEAR_CORNER, min(root, s), max(error, root_error)
         elif code == NO_WALL or root < s:
             code, s, error = candidate, root, root_error
     return code, s, error
@@ -178,7 +179,7 @@ def cap_flight(start, limit, has_base, particle, scene, anchors):
         y, vy = particle.y, particle.vy
         height = y + vy * s
         if height <= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * error:
-            return CORNER, s
+            return NEAR_CORNER, s
     return code, s
 
 
@@ -220,13 +221,13 @@ def is_within_rounding(wall, x, y, scene, anchors):
 
 @part
 def at_foot(code, particle, scene, anchors):
-    """Return why no flight begins on a wall of the stem: START where another one is within rounding."""
+    """Return why no flight begins on a wall of the stem: NEAR_START where another one is within rounding."""
     if code in (SLIDING, APPROACHING):
         for candidate in (LEFT, RIGHT, FLOOR):
             if candidate != particle.wall and is_within_rounding(
                 candidate, particle.x, particle.y, scene, anchors
             ):
-                return START
+                return NEAR_START
     return code
 
 
@@ -242,7 +243,7 @@ def at_base(inward, x, y, scene, anchors):
     else:
         is_corner = is_within_rounding(ARC, x, y, scene, anchors)
     if is_corner:
-        return START
+        return NEAR_START
     return SLIDING if inward == 0.0 else APPROACHING
 
 
@@ -257,18 +258,18 @@ def trouble_at_start(is_in_cap, particle, scene, anchors):
     x, y, vx, vy, wall = particle.x, particle.y, particle.vx, particle.vy, particle.wall
     is_mushroom = scene.table == MUSHROOM
     if y == 0.0 and wall in (ARC, LEFT, RIGHT):
-        return MOUTH_EDGE if is_mushroom and wall != ARC else ON_CORNER
+        return MOUTH_EDGE if is_mushroom and wall != ARC else CORNER
     if wall == BASE or (y == 0.0 and wall == NO_WALL and not is_mushroom):
         return at_base(vy if is_in_cap else -vy, x, y, scene, anchors)
     if y == 0.0 and wall == NO_WALL and vy > 0.0:
         # In the cap from the mouth or from the base, all the same, but not from the edge between them.
         gap, _ = wall_residual(RIGHT if x > 0.0 else LEFT, x, y, scene, anchors)
         if gap == 0.0:
-            return EDGE
+            return NEAR_MOUTH_EDGE
     elif y == 0.0 and wall == NO_WALL:
         side = side_of_mouth(0.0, x, vx, scene, anchors)
         if side == 0:
-            return EDGE
+            return NEAR_MOUTH_EDGE
         if side < 0:
             return at_base(vy, x, y, scene, anchors)
     return NO_WALL
@@ -281,12 +282,12 @@ def event_from_cap(crossing, limit, particle, scene, anchors):
     if code != NO_WALL or crossing >= limit:
         return code, s
     if side_of_wall(ARC, crossing, particle, scene, anchors) <= 0:
-        return CORNER, crossing
+        return NEAR_CORNER, crossing
     if scene.table == CAP:
         return BASE, crossing
     side = side_of_mouth(crossing, particle.x, particle.vx, scene, anchors)
     if side <= 0:
-        return (BASE if side < 0 else EDGE), crossing
+        return (BASE if side < 0 else NEAR_MOUTH_EDGE), crossing
     code, s, _ = earliest_side_or_floor(crossing, limit, released(particle), scene, anchors)
     return code, s
 
@@ -296,7 +297,7 @@ def event_from_stem(crossing, limit, particle, scene, anchors):
     """Find the next collision of a flight that begins in the stem and crosses y = 0 at a time; (code, s)."""
     y, vy = particle.y, particle.vy
     code, s, error = earliest_side_or_floor(0.0, min(crossing, limit), particle, scene, anchors)
-    edge = CORNER if scene.table == STEM else EDGE  # where a side ends at the top
+    edge = NEAR_CORNER if scene.table == STEM else NEAR_MOUTH_EDGE  # where a side ends at the top
     if code != NO_WALL:
         depth = -(y + vy * s)
         is_at_mouth = depth <= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * error
@@ -336,11 +337,11 @@ def first_event(particle, limit, scene, anchors):
 
 @part
 def step_before(wall, s, limit, particle, scene, anchors):
-    """Return the step to a hit that is clearly before the limit, else AT_END."""
+    """Return the step to a hit that is clearly before the limit, else NEAR_HORIZON."""
     code, time, after = move(wall, s, particle, scene, anchors)
     if code == wall and limit - time > CLOSE * limit + 1024.0 * abs(time - s):
         return code, time, after
-    return AT_END, s, particle
+    return NEAR_HORIZON, s, particle
 
 
 @part
@@ -357,23 +358,23 @@ def step(particle, limit, scene, anchors):
     # the start is judged all the same.
     ahead = limit * (1.0 + NEAR) if limit > 0.0 else LEAST
     code, s = first_event(particle, ahead, scene, anchors)
-    if limit == 0.0 and (code < HORIZON or code in (SLIDING, MOUTH_EDGE, ON_CORNER)):
+    if limit == 0.0 and (is_hit(code) or code in (SLIDING, MOUTH_EDGE, CORNER)):
         code = HORIZON  # it has arrived, even where it could not fly on
-    if code > HORIZON and limit > 0.0 and s > limit * (1.0 - CLOSE):
+    if is_lost(code) and limit > 0.0 and s > limit * (1.0 - CLOSE):
         if s <= limit * (1.0 + CLOSE):
-            code = AT_END
+            code = NEAR_HORIZON
         else:
             code, s = first_event(particle, limit, scene, anchors)
-    elif code < HORIZON and s > limit * (1.0 - NEAR):
+    elif is_hit(code) and s > limit * (1.0 - NEAR):
         side = side_of_wall(code, limit, particle, scene, anchors)
         if side > 0 and s < limit:
             # The wall has come back before the limit, unless s is not known so well.
             return step_before(code, s, limit, particle, scene, anchors)
         if side >= 0:
-            code = HORIZON if side > 0 else AT_END
-    if code > HORIZON:
+            code = HORIZON if side > 0 else NEAR_HORIZON
+    if is_lost(code):
         return code, s, particle
-    if code < HORIZON:
+    if is_hit(code):
         return move(code, s, particle, scene, anchors)
     x, y = fma(particle.vx, limit, particle.x), fma(particle.vy, limit, particle.y)
     t, low = two_sum(particle.t, limit)
@@ -479,7 +480,7 @@ def move(wall, s, particle, scene, anchors):
 
     Returns:
         (code, time, particle): the wall and the particle leaving it. Else the particle as it was, with
-        FAR_TIME, or with TANGENT where f' is so slight that the polished time lies before the start.
+        TOO_LATE, or with NEAR_TANGENCY where f' is so slight that the polished time lies before the start.
     """
     vx, vy, is_again, rest = particle.vx, particle.vy, wall == particle.wall, 0.0
     residual = residual_error = error = f = slope_s = 0.0
@@ -491,7 +492,7 @@ def move(wall, s, particle, scene, anchors):
     for _ in range(MAX_POLISHES):
         t, low = two_sum(particle.t, s)
         if not set_anchors(laws, anchors, t, low + particle.t_low + rest):
-            return FAR_TIME, s, particle
+            return TOO_LATE, s, particle
         s_low, x_s, x_low, y_s, y_low = remainder(wall, s, rest, residual, particle, scene, anchors)
         phase_error = max(phase_error, anchors[PHASE, PHASE_ERROR])
         if is_again and error < max(phase_error / SAFETY * residual_error, 2.0**-53 * abs(residual)):
@@ -509,7 +510,7 @@ def move(wall, s, particle, scene, anchors):
         s, rest = two_sum(s, rest + s_low)
     time = s + (rest + s_low)
     if not time >= 0.0:
-        return TANGENT, s, particle
+        return NEAR_TANGENCY, s, particle
     x_s, x_low = two_sum(x_s, x_low + vx * s_low)
     y_s, y_low = (0.0, 0.0) if wall == BASE else two_sum(y_s, y_low + vy * s_low)
     t, t_low = two_sum(t, low + particle.t_low + rest + s_low)
@@ -547,12 +548,12 @@ def scalar_step(particle, limit, origin, scene, anchors):
     For OFF_WALL the time of flight is the share of the wall's size by which the particle is off it.
     """
     if not set_anchors(scene.laws, anchors, particle.t, particle.t_low):
-        return FAR_TIME, 0.0, particle
+        return TOO_LATE, 0.0, particle
     if origin == GIVEN and particle.wall != NO_WALL:
         gap, size = wall_gap(particle, scene, anchors)
         if abs(gap) > ON_WALL * size:
             return OFF_WALL, gap / size, particle
     crossed = crossed_wall(particle, scene, anchors)
     if crossed != NO_WALL:
-        return BEYOND + crossed, 0.0, particle
+        return BEYOND_ARC + crossed, 0.0, particle
     return step(particle, limit, scene, anchors)

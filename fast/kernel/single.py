@@ -15,6 +15,7 @@ from fast.kernel.compiling import kept, kernel, part
 
 from fast.kernel.records import (  # isort: skip
     ANCHORS_SHAPE, ANSWER_LOST, BAD_QUESTION, HORIZON, OFF_WALL, SHARED, Compiled, Particle,
+    is_lost,
 )  # fmt: skip
 from fast.kernel.scalar_step import GIVEN
 from fast.kernel.worker import run_careful
@@ -106,7 +107,7 @@ def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
         return BAD_QUESTION, 0.0, t, x, y, vx, vy
     known = particle, end - particle.t, GIVEN, unpack_scene(numbers), np.zeros(ANCHORS_SHAPE)
     code, dt, p = run_careful(step_at, known)
-    if code > HORIZON:
+    if is_lost(code):
         return (BAD_QUESTION if code == OFF_WALL else code), 0.0, t, x, y, vx, vy
     if code == HORIZON:  # neither time is asked for
         dt, p = 0.0, Particle(0.0, 0.0, p.x, p.y, p.vx, p.vy, p.wall)

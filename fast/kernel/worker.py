@@ -22,13 +22,14 @@ import numpy as np
 from numba import config, typeof, types
 from numba.core.typing import Signature, signature as returns
 
+from fast.kernel import rows
 from fast.kernel.compiling import HOW, caller, kept, widest_registers
 from fast.kernel.lane_laws import DEGREES, NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, LANES, POOL_SIZE, Compiled, FloatArray, Followed, IntArray, LawLimits, LawsInLanes,
-    Particle, Stops,
+    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawLimits, LawsInLanes, Particle,
+    Stops,
 )  # fmt: skip
 
 from fast.kernel.scalar_step import scalar_step
@@ -114,7 +115,7 @@ class Worker(NamedTuple):
 
     Attributes:
         laws: the scene, as the lanes know it.
-        loops: the compiled loops for laws of this degree and such a slope.
+        loops: the compiled loops for laws of this form and such a slope.
         anchors: room for its laws at one time.
         is_laned: the lanes may be used.
         pools: (2, POOL_SIZE) general and disk pool.
@@ -149,9 +150,9 @@ def new_pools() -> FloatArray:
     numpy begins at any multiple of 16 bytes, and a register that is loaded across two lines takes longer: how
     quick the same loops were hung on where a process happened to put them.
     """
-    room = np.zeros(2 * POOL_SIZE + CACHE_LINE // 8)
+    room = np.zeros(2 * rows.POOL_SIZE + CACHE_LINE // 8)
     first = -room.ctypes.data % CACHE_LINE // 8
-    return room[first : first + 2 * POOL_SIZE].reshape(2, POOL_SIZE)
+    return room[first : first + 2 * rows.POOL_SIZE].reshape(2, rows.POOL_SIZE)
 
 
 def new_worker(
@@ -160,11 +161,11 @@ def new_worker(
     """Return a worker that holds no particle yet; with its scene's loops, or the given ones."""
     return Worker(
         in_lanes,
-        loops or loops_for(in_lanes.is_slope_moving, in_lanes.degree),
+        loops or loops_for(in_lanes.is_slope_moving, in_lanes.form),
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
         new_pools(),
-        np.zeros((2, 2, LANES), np.int64),
+        np.zeros((2, 2, rows.LANES), np.int64),
         np.zeros(2, np.int64),
         stops,
         followed,

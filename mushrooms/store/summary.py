@@ -9,12 +9,12 @@ import numpy.typing as npt
 from mpmath import fp
 
 import theory
-from fast.ensemble import FOLLOWED, UNDECIDED, Ensemble, one_cycle
+from fast.ensemble import FOLLOWED, UNDECIDED, Ensemble
 from mushrooms.orbits import stretches
 from mushrooms.store.spec import RunSpec
 from scene import BadInput, Mushroom, Scene
 from scene.geometry import table_at
-from scene.mouth import mouth_minima, start_time
+from scene.mouth import mouth_minima, one_cycle, start_time
 
 
 class RunTally(NamedTuple):

@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from conformance.cases.certify import proved_step
+from conformance.cases.certify import proved_step, with_further
 from conformance.vectors import Expectation
 from conformance.verify import WALLS
 from scene import BadInput, State, from_data
@@ -90,7 +90,8 @@ def answer(name: str, state: State, t_end: float) -> Line | None:
     if claim is None:
         return None
     question = {"id": "grid/1", "kind": "step", "scene": SCENES[name], "state": state, "t_end": t_end}
-    line: Line = json.loads(msgspec.json.encode({**question, "expect": [claim]}))
+    expect = with_further(claim, scene, state)
+    line: Line = json.loads(msgspec.json.encode({**question, "expect": expect}))
     return line
 
 

@@ -3,9 +3,9 @@
 from numba.core.dispatcher import Dispatcher
 
 from fast import batch
-from fast.kernel import arithmetic, fine_step, follow, lane_laws, scalar_step, single, worker
+from fast.kernel import arithmetic, fine_step, follow, lane_laws, path, scalar_step, single, worker
 
-MODULES = (arithmetic, batch, fine_step, follow, lane_laws, scalar_step, single, worker)
+MODULES = (arithmetic, batch, fine_step, follow, lane_laws, path, scalar_step, single, worker)
 
 
 def kept_entries() -> list[Dispatcher]:

@@ -6,14 +6,14 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 import fast
-from fast.kernel import lane_laws, records
+from fast.kernel import lane_laws, records, rows
 from fast.kernel.arithmetic import fma
 from support.from_python import from_python
 
@@ -60,9 +60,9 @@ def faulty_lanes(*changes: str) -> ModuleType:
     module = ModuleType("faulty_lanes")
     for name, source in sources.items():  # the last one's functions replace those that the first imports
         exec(compile(source, name, "exec"), module.__dict__)
-    for name, found in vars(records).items():
+    for name, found in (vars(records) | vars(rows)).items():
         vars(module).setdefault(name, found)
-    names = [each.__name__ for each in (module, lane_laws, records)]
+    names = [each.__name__ for each in (module, lane_laws, records, rows)]
     for name, found in list(vars(module).items()):
         function = found.py_func if isinstance(found, Dispatcher) else found
         place = getattr(function, "__module__", None)
@@ -73,5 +73,6 @@ def faulty_lanes(*changes: str) -> ModuleType:
             setattr(module, name, from_python(found))
         elif isinstance(found, np.integer):
             setattr(module, name, int(found))
-    vars(module).update(fma=from_python(fma), widest_registers=lambda: None)
+    plain = {n: int(v) if isinstance(v, np.integer) else v for n, v in vars(rows).items()}
+    vars(module).update(rows=SimpleNamespace(**plain), fma=from_python(fma), widest_registers=lambda: None)
     return module

@@ -13,7 +13,7 @@ from types import ModuleType
 import numpy as np
 
 from fast.batch import LaneRound, residual, take_careful_steps
-from fast.kernel import lanes, records
+from fast.kernel import lanes, records, rows
 from fast.kernel.fine_step import FineState, fine_path
 from fast.kernel.records import DEPTH, RATE, FloatArray, Particle
 from scene import Scene
@@ -54,8 +54,8 @@ class Round(LaneRound):
         """Take a step in n lanes; faulty kernels run uncompiled, on a list."""
         if self.is_disk:
             # A step is judged from its state alone, not from the angular momentum of the interval so far.
-            x, y, vx, vy = (self.row(r, n) for r in (records.X, records.Y, records.VX, records.VY))
-            self.row(records.SPIN, n)[:] = x * vy - y * vx
+            x, y, vx, vy = (self.row(r, n) for r in (rows.X, rows.Y, rows.VX, rows.VY))
+            self.row(rows.SPIN, n)[:] = x * vy - y * vx
         if self.kernels is lanes:
             super().advance(n)
             return
@@ -69,25 +69,22 @@ class Round(LaneRound):
     def call_loop(self, a: list[float], count: int) -> None:
         """Call the loop of the kernels that `follow.advance` calls."""
         of, k = self.in_lanes, self.kernels
-        waves = of.waves if of.degree in (k.ONE_WAVE, k.TWO_WAVES) else None
+        waves = of.waves if of.form in (k.ONE_WAVE, k.TWO_WAVES) else None
         step = k.chord if self.is_disk else k.fly
         slope = None if of.is_slope_moving else of.slope
-        step(a, count, of.scene, waves, slope, (0,) * of.degree, of.limits)
+        step(a, count, of.scene, waves, slope, (0,) * of.form, of.limits)
 
     def correct_lane(self, a: list[float], i: int) -> None:
         """Correct a step that is not yet right again, as the next rounds do."""
         k = self.kernels
-        spare = [0.0] * records.POOL_SIZE
-        k.copy_rows(a, i, spare, 0, 0, records.POOL_SIZE)
-        while (
-            spare[records.FATE] in (records.COARSE, records.FAR)
-            and spare[records.TRIES] <= records.MAX_CORRECTIONS
-        ):
-            if spare[records.FATE] == records.FAR:
-                t = spare[records.T] + spare[records.S]
-                k.set_reference(spare, 0, t, spare[records.T_LOW], self.in_lanes)
+        spare = [0.0] * rows.POOL_SIZE
+        k.copy_rows(a, i, spare, 0, 0, rows.POOL_SIZE)
+        while spare[rows.FATE] in (rows.COARSE, rows.FAR) and spare[rows.TRIES] <= rows.MAX_CORRECTIONS:
+            if spare[rows.FATE] == rows.FAR:
+                t = spare[rows.T] + spare[rows.S]
+                k.set_reference(spare, 0, t, spare[rows.T_LOW], self.in_lanes)
             self.call_loop(spare, 1)
-        k.copy_rows(spare, 0, a, i, 0, records.POOL_SIZE)
+        k.copy_rows(spare, 0, a, i, 0, rows.POOL_SIZE)
 
     def careful_step(self, p: FloatArray, wall: int) -> tuple[int, float, FloatArray]:
         """Return the scalar step's wall, its time, and the state after, from a state and its wall."""
@@ -173,7 +170,7 @@ def search(seed: int, n: int, tally: Counter[str], name: str, kernels: ModuleTyp
     for _ in range(n // ANSWERS_OF_A_DRAW):
         if tally["lane answers"] >= most or (found and kernels is not lanes):
             break
-        scene, starts = group.draw(records.LANES, random)
+        scene, starts = group.draw(rows.LANES, random)
         found += try_starts(
             Round(scene, kernels, is_captured=group.is_captured), scene, starts, random, tally
         )
@@ -197,7 +194,7 @@ def try_starts(
         for i in np.flatnonzero(is_live):
             p, wall = begun[i]
             code, truth = pool.careful(p, wall)
-            if code == records.START:  # the careful step cannot tell whether it is inside its walls
+            if code == records.NEAR_START:  # the careful step cannot tell whether it is inside its walls
                 tally["starts at a corner"] += 1
                 is_live[i] = False
                 is_wrong = hits[i] != records.FLOOR and pool.is_floor_met_at_once(p)
@@ -238,5 +235,5 @@ def error_of(
 
 def state_in(pool: Round, i: int) -> tuple[FloatArray, int]:
     """Return the state in a lane, as the kernels take it."""
-    rows = (records.T, records.T_LOW, records.X, records.Y, records.VX, records.VY)
-    return np.array([pool.pool[row + i] for row in rows]), int(pool.pool[records.WALL + i])
+    columns = (rows.T, rows.T_LOW, rows.X, rows.Y, rows.VX, rows.VY)
+    return np.array([pool.pool[row + i] for row in columns]), int(pool.pool[rows.WALL + i])

@@ -36,6 +36,15 @@ AFTER = math.nextafter(0.5, 1)
 TURNING = fourier(mean=1.0, omega=None, period=8.0)  # 1 at time 0, and more up to time 4
 BENT: dict[str, Any] = {**STEM, "h": bang_bang([0.0, 1.0], [1.0, 2.0], [2.0, 1.0])}
 LEANING = {**STEM, "slope": -1.0}
+SOON = 2.0**-120
+SINKING = {**STEM, "h": fourier(omega=None, period=2.0, sin=[], cos=[0.25])}
+
+
+def both_waves(cos: float) -> dict[str, Any]:
+    """Return a stem whose floor is at rest at time 0, with an acceleration that is that of a cosine."""
+    return {**STEM, "h": fourier(omega=None, period=2.0, sin=[0.25, -0.125], cos=[cos])}
+
+
 STARTS: list[tuple[dict[str, Any], dict[str, Any], float, str]] = [
     # Where the state lies.
     (CAP, state(0.0, -0.001, 0.0, 1.0), 9.0, "rejected"),
@@ -106,6 +115,12 @@ STARTS: list[tuple[dict[str, Any], dict[str, Any], float, str]] = [
      state(0.0, -1.0, 0.25, 0.0, "floor"), 9.0, "sliding"),
     ({**STEM, "h": fourier(omega=None, period=2.0, sin=[0.25]), "w": 2.0},
      state(2.0, -0.5, 0.0, 0.25, "right"), 9.0, "tangency"),
+    # Where a cosine turns, f' = vy, and the floor rises from there. With 128 bits vy is lost, with more not.
+    (SINKING, state(0.0, -1.25, 0.0, 2.0**-140, "floor"), SOON, "floor"),
+    (SINKING, state(0.0, -1.25, 0.0, -(2.0**-140), "floor"), SOON, "rejected"),
+    # f' = 0 exactly, and f'' is that of a cosine, which is lost with 128 bits.
+    (both_waves(2.0**-140), state(0.0, -1.0, 0.0, 0.0, "floor"), SOON, "sliding"),
+    (both_waves(-(2.0**-140)), state(0.0, -1.0, 0.0, 0.0, "floor"), SOON, "horizon"),
     # Not on a wall at this phase, but at phase 0.
     ({**STEM, "w": TURNING}, state(1.0, -0.5, 0.5, 0.0, t=1.0), 9.0, "right"),
     ({**CAP, "r": TURNING}, state(0.0, 1.0, 0.0, 0.5, t=1.0), 9.0, "arc"),

@@ -9,12 +9,12 @@ import pytest
 
 from conformance.cases.draw import Draw
 from conformance.profiles import margin
-from conformance.suite.checks import flows, requests
+from conformance.suite.checks import flows, paths, requests
 from conformance.suite.checks.form import Implementation, octaves
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import graded_parts
 from conformance.vectors import Vector, question
-from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, load
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, load
 from scene.geometry import area
 from scene.laws import bounds
 from theory import predict
@@ -179,3 +179,31 @@ def test_a_mean_growth_is_asked_of_as_many_particles_as_tell_it_from_0(energy, b
         flows._mean_growth(asked, scene, flows.Size(least, energy, bias), 1)
     with pytest.raises(CheckFailure, match="cannot tell m1 from 0"):
         flows._mean_growth(asked, scene, flows.Size(least - 1, energy, bias), 1)
+
+
+FALLING = State(0.0, 0.125, 0.5, 0.0, -1.0)
+# Of a fall to the base, which ends at (0.125, 0) at t = 0.5: what is changed, and what is said.
+SPOILT: list[tuple[dict[str, Any], str]] = [
+    ({}, ""),
+    ({"dt": 0.4375, "t": 0.4375, "y": 0.0625}, "is off its wall"),
+    ({"dt": 0.5625, "t": 0.5625, "y": -0.0625}, "is off its wall"),
+    ({"t": 0.625}, "its time is not when the flight ends"),
+    ({"x": 0.25}, "is off the flight before"),
+    ({"vy": -1.0}, "is not turned round by its wall"),
+    ({"vx": 0.25}, "is not turned round by its wall"),
+]
+
+
+@pytest.mark.parametrize(("changes", "said"), SPOILT, ids=range(len(SPOILT)))
+def test_a_hit_to_which_no_flight_led_is_named_by_its_flaw(changes, said):
+    right = Collision(dt=0.5, t=0.5, x=0.125, y=0.0, vx=0.0, vy=1.0, wall="base")
+    flaw = paths.flaw_of(SCENE, FALLING, [msgspec.structs.replace(right, **changes)], {})
+    assert flaw == (f"outcome 1 {said}" if said else "")
+
+
+@pytest.mark.parametrize("profile", ["step", "trajectory", "flow"])
+def test_bad_states_are_bad_for_what_is_said_alone(profile):
+    """Only a start that is late on purpose is asked about up to an earlier time."""
+    for scene, asked, why in requests.bad_states(Draw("states"), profile):
+        starts = asked["states"] if profile == "flow" else [asked["state"]]
+        assert all((asked["t_end"] < start["t"]) == ("begins after" in why) for start in starts), (scene, why)

@@ -281,8 +281,8 @@ def test_the_verifier_knows_a_rule(rule):
 
 SOURCE = (DOCS.parent / "conformance" / "verify.py").read_text("utf-8")
 WEAKER = {
-    "harmonics": ("MOST_WAVES, MOST_KNOTS = 16, 256", "MOST_WAVES, MOST_KNOTS = 99, 256"),
-    "knots": ("MOST_WAVES, MOST_KNOTS = 16, 256", "MOST_WAVES, MOST_KNOTS = 16, 999"),
+    "harmonics": ("MOST_WAVES = 16", "MOST_WAVES = 99"),
+    "knots": ("MOST_KNOTS = 256", "MOST_KNOTS = 999"),
     "positive-rate": ("(omega or period or 0) > 0", "(omega or period or 1) > 0"),
     "rising-times": ("t < u, Refused", "t <= u, Refused"),
     "exact-period": ('read_number("period", period) == period', "True"),
@@ -290,8 +290,8 @@ WEAKER = {
     "known-law-fields": ("is_loose |= is_more", "pass"),
     "no-null": ("(value is not None or name not in OPTIONAL)", "True"),
     "texts": ("is_loose |= not all(", "not all("),
-    "early": ("LATE, LARGE = 2**30, ", "LATE, LARGE = 2**31, "),
-    "small": ("Fraction(10**100)  # |t|", "Fraction(10**101)  # |t|"),
+    "early": ("LATE = 2**30", "LATE = 2**31"),
+    "small": ("LARGE = Fraction(10**100)", "LARGE = Fraction(10**101)"),
     "time-left": ("if state.t < t_end:\n            raise", "raise"),
     "end-not-before": ("state.t <= t_end, Refused", "True, Refused"),
 }

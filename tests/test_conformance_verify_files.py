@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -283,7 +284,9 @@ def test_a_full_disk_is_one_line():
 def test_an_interrupt_is_one_line():
     command = [sys.executable, "-I", "-u", verify.__file__, "-"]
     pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) as process:
+    # A shell lets its background jobs ignore the signal, and those hand that on.
+    hear = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, preexec_fn=hear) as process:
         assert process.stdin is not None
         assert process.stdout is not None
         process.stdin.write(json.dumps(FALSE).encode() + b"\n" * 2**16)

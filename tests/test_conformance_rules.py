@@ -44,7 +44,6 @@ from scene import (
     from_data,
     laws as law_module,
 )
-from scene.load import json_schema
 from scene.protocol import rules
 from scene.protocol.rules import BY_NAME, RULES, Duty, ProtocolRule, is_late, without_loose
 from scene.states import ON_WALL, check_numbers
@@ -569,9 +568,3 @@ def test_lateness_is_decided_at_adjacent_floats_on_both_sides_of_time_0():
         assert told == sorted(told)
         assert len(set(told)) == 2
         assert told == [is_late(scene, -t) for t in around]
-
-
-def test_the_schema_of_scenes_is_what_is_published():
-    assert json.loads((DOCS / "scene.schema.json").read_text("utf-8")) == json.loads(
-        json.dumps(json_schema())
-    )

@@ -1,6 +1,7 @@
 """Parts of the checks, one by one: what is drawn, and what is said of answers that are given by hand."""
 
 import math
+import re
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 
 from conformance.cases.draw import Draw
 from conformance.profiles import margin
+from conformance.suite import pytest_plugin
 from conformance.suite.checks import flows, paths, requests
 from conformance.suite.checks.form import Implementation, octaves
 from conformance.suite.process import CheckFailure
@@ -207,3 +209,24 @@ def test_bad_states_are_bad_for_what_is_said_alone(profile):
     for scene, asked, why in requests.bad_states(Draw("states"), profile):
         starts = asked["states"] if profile == "flow" else [asked["state"]]
         assert all((asked["t_end"] < start["t"]) == ("begins after" in why) for start in starts), (scene, why)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, None),
+        ({"mushrooms_command": None}, None),
+        ({"mushrooms_command": "a 'b"}, '--mushrooms-command = "a \'b": No closing quotation'),
+        ({"mushrooms_seed": -1}, "--mushrooms-seed = -1"),
+        ({"mushrooms_timeout": 0.0}, "--mushrooms-timeout = 0.0, must be above 0"),
+        ({"mushrooms_timeout": math.nan}, "--mushrooms-timeout = nan, must be above 0"),
+    ],
+)
+def test_a_bad_option_of_the_plugin_is_refused_by_its_name(changes, said):
+    options = {"mushrooms_seed": 1, "mushrooms_timeout": 1.0, "mushrooms_command": "a 'b c'"} | changes
+    config = SimpleNamespace(option=SimpleNamespace(**options))
+    if said is None:
+        pytest_plugin.pytest_configure(config)
+    else:
+        with pytest.raises(pytest.UsageError, match=re.escape(said)):
+            pytest_plugin.pytest_configure(config)

@@ -1224,7 +1224,7 @@ def require_valid(scene: Scene) -> None:
     that attains a bound <= 0 (`is_tight`). As r > 0, w = nu r <= r means nu <= 1. A condition that
     touches 0 may stay open.
 
-    The search has 256 bits at every precision. More bits would seldom decide more, because the
+    The search has 256 bits at every precision. More bits would rarely decide more, because the
     numbers of a scene have 53. What is proved does not depend on that, only what stays open.
 
     Raises:

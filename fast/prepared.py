@@ -1,7 +1,7 @@
 """A scene as this package computes with it: prepared once, found by scene, and handed down.
 
 Each entry of the package asks `prepare` for its scene and hands on what that returns.
-What takes long, or is seldom needed, is found when it is first asked for.
+What takes long, or is rarely needed, is found when it is first asked for.
 """
 
 from __future__ import annotations

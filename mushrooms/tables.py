@@ -103,7 +103,7 @@ def import_arrow() -> tuple[Any, Any]:
 
 
 def _write_csv(tables: Tables, note: Callable[[bytes], object], file: BinaryIO) -> None:
-    """Write CSV, whose numbers read back to the same bits; `note` is told of every byte."""
+    """Write CSV, whose numbers read back to the same bits; `note` receives each piece as it is written."""
     for number, columns in enumerate(tables):
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")

@@ -148,7 +148,7 @@ FORMS = {
 
 @pytest.mark.parametrize("row", FORMS.values(), ids=FORMS)
 def test_a_field_that_a_line_does_not_have_is_refused_by_name(row, tmp_path, capsys):
-    """Whoever reads the line may take the field for proved."""
+    """A reader of the line may take the field for proved."""
     (*path, name), words = row
     record = json.loads(TEXT)
     part: Any = record

@@ -7,6 +7,7 @@ import io
 import itertools
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection, PolyCollection
@@ -193,8 +194,21 @@ def test_the_boundary_map_has_every_collision_and_the_walls_in_their_slots(movin
     assert (axes.get_xlim(), axes.get_ylim()) == ((0, 1), (-1, 1))
 
 
-def test_the_energy_in_time_stands_beside_theory_and_captures_are_shaded(moving):
+@pytest.fixture(scope="module")
+def later(moving) -> orbits.FollowedOrbit:
+    """Return an orbit that begins a third of a cycle after theory's."""
     orbit = next(one for one in moving if 5 < np.count_nonzero(one.captured()) < 195)
+    states = orbit.states()
+    k = int(np.argmax(states[:, 0] > MOVING.period / 3))
+    begin = msgspec.structs.replace(State(*states[k].tolist()), wall=orbit.walls[k - 1])
+    return orbits.from_state(MOVING, begin, 150)
+
+
+@pytest.mark.parametrize("begins_later", [False, True])
+def test_the_energy_in_time_stands_beside_theory_and_captures_are_shaded(moving, later, begins_later):
+    orbit = next(one for one in moving if 5 < np.count_nonzero(one.captured()) < 195)
+    orbit = later if begins_later else orbit
+    assert (orbit.start.t > 1.0) is begins_later
     [axes] = pictures.energy_in_time(orbit).axes
     states = orbit.states()
     time = (states[:, 0] - states[0, 0]) / MOVING.period
@@ -218,6 +232,9 @@ def test_the_energy_in_time_stands_beside_theory_and_captures_are_shaded(moving)
     assert is_shaded[1:-1][captured[:-3] & captured[1:-2] & captured[2:-1]].all()
     assert is_shaded.any()
     assert axes.get_xlabel() == "t / T"
+
+
+def test_the_energy_of_a_table_that_stands_still_is_drawn_against_time():
     [still] = orbits.follow(load("frozen-mushroom"), 9, seed=1)
     [axes] = pictures.energy_in_time(still).axes
     assert axes.get_xlabel() == "t [time]"
@@ -249,7 +266,7 @@ def test_exponents_are_those_of_the_stretches_with_their_errors(monkeypatch):
     assert axes.get_title().startswith("frozen-mushroom: 2 particles from E0 = ")
 
 
-def test_an_animation_shows_the_particle_where_it_is(moving, monkeypatch):
+def test_an_animation_shows_the_particle_where_it_is(moving, later, monkeypatch):
     shown = []
 
     def look(scene, axes, times, show, _file, _progress):
@@ -259,7 +276,7 @@ def test_an_animation_shows_the_particle_where_it_is(moving, monkeypatch):
             shown.append((times[k], np.column_stack(xy(trail)), np.ravel(xy(dot)), axes.get_title()))
 
     monkeypatch.setattr(tables, "write_frames", look)
-    for orbit in (moving[0], orbits.follow(load("frozen-mushroom"), 9, seed=1)[0]):
+    for orbit in (moving[0], later, orbits.follow(load("frozen-mushroom"), 9, seed=1)[0]):
         shown.clear()
         pictures.write_animation(orbit, io.BytesIO(), 7)
         states, period = orbit.states(), orbit.scene.period
@@ -427,14 +444,19 @@ def test_a_cycle_that_begins_at_a_narrow_mouth_has_no_theory():
     assert labels(axes) == ["simulation"]
 
 
-def test_residuals_are_all_within_their_panel():
-    """Large ones, too, to either side."""
-    for shift in (-0.02, 0.02):
-        s = np.random.default_rng(1).normal(shift, 0.01, 3000)
-        rest = energies.histogram(load("ergodic"), 1e6, s).axes[1]
-        left = xy(rest.lines[-1])[1]
-        assert rest.get_ylim()[0] < np.nanmin(left)
-        assert np.nanmax(left) < rest.get_ylim()[1]
+@pytest.mark.parametrize(("n", "shift", "width"), [
+    (3000, -0.02, 0.01), (3000, 0.02, 0.01), (3000, 0.0, None), (20, 0.0, 0.01),
+])  # fmt: skip
+def test_residuals_are_all_within_their_panel(n, shift, width):
+    """Large ones, too, to either side; small ones, and none where bars hold few particles, do not widen it."""
+    found = theory.at_energy(load("ergodic"), 1e6)
+    s = np.random.default_rng(1).normal(found.peak[0] + shift, width or found.peak[1] ** 0.5, n)
+    rest = energies.histogram(load("ergodic"), 1e6, s).axes[1]
+    largest = np.abs(xy(rest.lines[-1])[1])
+    reach = 1.1 * np.nanmax(largest, initial=0.0)
+    assert (reach > 4.0) == bool(shift)
+    assert np.isnan(largest).all() == (n == 20)
+    assert rest.get_ylim() == pytest.approx((-max(4.0, reach), max(4.0, reach)))
 
 
 def test_many_points_are_drawn_finer(moving):
@@ -458,8 +480,9 @@ def test_bars_have_the_errors_of_their_counts():
     assert errors.x == pytest.approx((shown.edges[1:] + shown.edges[:-1]) / 2)
     assert errors.y == pytest.approx(counts / unit)
     assert errors.errors == pytest.approx(np.sqrt(counts) / unit)
-    assert axes.get_ylim()[0] == 0
-    assert axes.get_ylim()[1] >= shown.heights.max()
+    curve = xy(line(axes, "theory at this energy"))[1]
+    highest = max(curve.max(), (errors.y + errors.errors).max())
+    assert axes.get_ylim() == (0, pytest.approx(energies.ROOM * highest))
     assert axes.get_xlim() == pytest.approx((shown.edges[0], shown.edges[-1]))
     found = theory.at_energy(load("ergodic"), 1e6)
     expected = np.diff(found.cdf(shown.edges)) * len(s)

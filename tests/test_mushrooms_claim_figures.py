@@ -169,7 +169,9 @@ def test_widths_are_those_of_the_samples_and_the_printed_power_grows(
         widths = [free_gain(sample(name)).std(ddof=1) for name in names]
         assert found.x == pytest.approx([RUNS[name].energy for name in names])
         assert found.y == pytest.approx(widths)
-        assert found.errors == pytest.approx([width_error(free_gain(sample(name))) for name in names], rel=1e-6)
+        assert found.errors == pytest.approx(
+            [width_error(free_gain(sample(name))) for name in names], rel=1e-6
+        )
         [fit] = [
             one for one in axes.lines if len(xy(one)[0]) == 3 and one.get_linestyle() == "-"
             and xy(one)[0][0] == found.x[0]

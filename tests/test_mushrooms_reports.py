@@ -214,6 +214,48 @@ def test_the_page_of_a_check_lists_the_first_cases_and_counts_the_rest(monkeypat
     assert (BAD[-1].id in text) == (n_left <= 0)
 
 
+def cells(row: str) -> list[str]:
+    return [re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<t[hd].*?</t[hd]>", row, re.S)]
+
+
+def test_the_page_of_a_check_counts_verdicts_by_group():
+    """A verdict that nothing has gets no column, but for pass; a known failure is listed with its mark."""
+    known = a_result("arc/2", "fail", "as it is", is_known=True)
+    further = [a_result("property/turn", "pass", "turned"), a_result("profile/time", "fail", "slow")]
+    beyond = a_result("stem/9", "pass", relative=1.0)
+    for results, seen in (
+        ([*GOOD, *BAD, known, *further, beyond],
+         ["pass", "fail", "declined", "unsupported", "crashed", "timed-out"]),
+        ([a_result("cap/1", "timed-out", "slow")], ["pass", "timed-out"]),
+    ):  # fmt: skip
+        run = a_run(*results)
+        page = check_page.to_html(run)
+        table = page.partition("<h2>Verdicts by group</h2>")[2].partition("</table>")[0]
+        head, *rows = [found for found in map(cells, table.split("</tr>")) if found]
+        assert head == ["Group", "Cases", *seen, "Worst ulps", "A/B/C", "Class"]
+        groups = list(dict.fromkeys(one.group for one in results))
+        assert [row[0] for row in rows] == [*groups, "all"]
+        for row in rows:
+            own = [one for one in results if row[0] in (one.group, "all")]
+            counts = [sum(one.verdict == verdict for one in own) for verdict in seen]
+            assert row[1 : 2 + len(seen)] == [str(n) for n in (len(own), *counts)]
+        listed = page.partition("<h2>All that did not pass</h2>")[2].partition("</table>")[0]
+        rows = [found for found in map(cells, listed.split("</tr>")) if found][1:]
+        assert rows == [
+            [one.id, one.verdict + (" (known)" if one.is_known else ""), one.why]
+            for one in results
+            if one.verdict != "pass"
+        ]
+        listed = page.partition("<h2>Properties and profiles</h2>")[2].partition("</table>")[0]
+        rows = [found for found in map(cells, listed.split("</tr>")) if found][1:]
+        assert rows == [[one.id, one.verdict, one.why] for one in results if one in further]
+    every = cells(check_page.to_html(a_run(*GOOD, beyond)).partition("<h2>Verdicts")[2].partition("total")[2])
+    assert every[:6] == ["all", "4", "4", "inf", "2/1/1", "C"]
+    assert (
+        cells(check_page.to_html(a_run(*GOOD)).partition("<h2>Verdicts")[2].partition("total")[2])[3] == "900"
+    )
+
+
 def test_the_scoreboard_has_a_row_and_the_reasons_of_each_stepper():
     good, bad = a_run(*GOOD), a_run(*GOOD, *BAD, diagnosis=["Like a mutant: stale."], seconds=600.4)
     graded = [

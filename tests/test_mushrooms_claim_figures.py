@@ -16,7 +16,7 @@ from matplotlib.text import Annotation
 from mpmath import fp
 from scipy.stats import norm
 from support import adiabatic_particles
-from support.artists import bars, labels, line, measured, words, xy
+from support.artists import bars, labels, line, measured, xy
 
 import theory
 from conformance.audit.claims import finite_energy

@@ -448,7 +448,7 @@ def test_a_cycle_that_begins_at_a_narrow_mouth_has_no_theory():
     (3000, -0.02, 0.01), (3000, 0.02, 0.01), (3000, 0.0, None), (20, 0.0, 0.01),
 ])  # fmt: skip
 def test_residuals_are_all_within_their_panel(n, shift, width):
-    """Large ones, too, to either side; small ones, and none where bars hold few particles, do not widen it."""
+    """Large ones, too, to either side; small ones, and none where bars hold few, do not widen it."""
     found = theory.at_energy(load("ergodic"), 1e6)
     s = np.random.default_rng(1).normal(found.peak[0] + shift, width or found.peak[1] ** 0.5, n)
     rest = energies.histogram(load("ergodic"), 1e6, s).axes[1]

@@ -469,8 +469,10 @@ def test_many_points_are_drawn_finer(moving):
     assert max(sizes[1]) < min(sizes[0]) <= 4.5
 
 
-def test_bars_have_the_errors_of_their_counts():
-    s = np.random.default_rng(1).normal(0.0, 0.01, 3000)
+@pytest.mark.parametrize("width", [0.005, 0.03])
+def test_bars_have_the_errors_of_their_counts(width):
+    """The panel is as high as the bars or as theory, whichever is higher."""
+    s = np.random.default_rng(1).normal(0.0, width, 3000)
     figure = energies.histogram(load("ergodic"), 1e6, s)
     axes, rest = figure.axes
     shown = bars(axes)
@@ -482,6 +484,7 @@ def test_bars_have_the_errors_of_their_counts():
     assert errors.errors == pytest.approx(np.sqrt(counts) / unit)
     curve = xy(line(axes, "theory at this energy"))[1]
     highest = max(curve.max(), (errors.y + errors.errors).max())
+    assert (highest == curve.max()) == (width > 0.01)
     assert axes.get_ylim() == (0, pytest.approx(energies.ROOM * highest))
     assert axes.get_xlim() == pytest.approx((shown.edges[0], shown.edges[-1]))
     found = theory.at_energy(load("ergodic"), 1e6)

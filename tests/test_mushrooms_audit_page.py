@@ -169,7 +169,8 @@ def test_a_run_is_described_by_its_particles(result, sample):
     expected = {
         "name": MAIN, "scene": scenes.to_data(scenes.load("moving-cap")), "energy": 1e7, "cycles": 1,
         "particles": 300, "phases": list(RUNS[MAIN].phases), "seed": run_seed(5, RUNS[MAIN]),
-        "followed": len(gain), "undecided": 0, "undefined": 0, "collisions": sample.n_collisions, "careful": sample.n_careful,
+        "followed": len(gain), "undecided": 0, "undefined": 0, "collisions": sample.n_collisions,
+        "careful": sample.n_careful,
         "captured": pytest.approx(is_captured.mean()), "m1": pytest.approx(gain.mean()),
         "m1_error": pytest.approx(gain.std(ddof=1) / len(gain) ** 0.5),
         "sigma_w": pytest.approx(gain[~is_captured].std(ddof=1)), "seconds": round(sample.seconds, 3),

@@ -16,7 +16,8 @@ from matplotlib.text import Annotation
 from mpmath import fp
 from scipy.stats import norm
 from support import adiabatic_particles
-from support.artists import bars, labels, line, measured, xy
+from support.artists import bars, labels, line, measured, said, xy
+from support.figure_words import CLAIMS
 
 import theory
 from conformance.audit.claims import finite_energy
@@ -434,3 +435,8 @@ def test_the_zone_is_followed_through_the_cycle(
         assert np.interp(np.linspace(0, 1, 9), x, y) == pytest.approx(law, abs=5e-3)
         assert axes.get_title() == name
     assert right.get_ylim() == pytest.approx((0, 1.05))
+
+
+@pytest.mark.parametrize("claim", PICTURES)
+def test_a_figure_says_what_it_shows(figure: Callable[[str], Figure], claim: str) -> None:
+    assert said(figure(claim)) == CLAIMS[claim]

@@ -14,7 +14,8 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.text import Annotation
 from mpmath import fp
 from PIL import Image
-from support.artists import bars, labels, line, measured, with_errors, xy
+from support.artists import bars, labels, line, measured, said, with_errors, xy
+from support.figure_words import PICTURES
 
 import scene as scenes
 import theory
@@ -580,3 +581,33 @@ def test_colours_of_phases_go_from_dark_to_light():
     light = [sum(int(one[k : k + 2], 16) for k in (1, 3, 5)) for one in colours]
     assert len(set(colours)) == 5
     assert light[0] < light[-1]
+
+
+NAMELESS = msgspec.structs.replace(MOVING, name="", slope=0.05)  # no rates were measured for it
+GAINS = np.random.default_rng(1).normal(0.1, 0.1, (400, 3))
+DRAWN = {
+    "path": lambda found: pictures.trajectory(found[0]),
+    "path at rest": lambda _: pictures.trajectory(
+        orbits.follow(msgspec.structs.replace(load("frozen-mushroom"), name=""), 9, seed=1)[0]
+    ),
+    "section": pictures.section,
+    "section at a phase": lambda found: pictures.section(found, 0.25),
+    "section of a stem": lambda _: pictures.section(orbits.follow(STEM, 60, energy=1.8, seed=1)),
+    "section of a stem at a phase": lambda _: pictures.section(
+        orbits.follow(STEM, 60, energy=1.8, seed=1), 0.5
+    ),
+    "map": pictures.collision_map,
+    "map of a cap": lambda _: pictures.collision_map(orbits.follow(CAP, 20, seed=1)),
+    "energy": lambda found: pictures.energy_in_time(found[0]),
+    "energy in a cap": lambda _: pictures.energy_in_time(orbits.follow(CAP, 20, seed=1)[0]),
+    "histogram": lambda _: energies.histogram(MOVING, 1e6, GAINS[:, 0], 500),
+    "histogram at high energies": lambda _: energies.histogram(NAMELESS, 1e6, GAINS[:, 0]),
+    "growth": lambda _: energies.growth(MOVING, 1e6, GAINS),
+    "loops": lambda _: heating.draw_loops((1.0,), 3),
+    "phases": lambda _: heating.draw_phase_diagram(2, 2),
+}
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_figure_says_what_it_shows(moving, name):
+    assert said(DRAWN[name](moving)) == PICTURES[name]

@@ -390,6 +390,36 @@ def test_a_step_is_drawn_from_its_start_to_both_ends_with_its_direction(figures)
     assert whole.get_legend() is not None
 
 
+FALSE_STEPS = [  # of a step to x = 0.5, y = 0.6, vx = 1, vy = -1 at t = 1: what is given, and what is said
+    ({"x": 0.5, "y": 0.61}, "y = 0.61, must be 0.6: off by 0.01"),
+    ({"x": 0.48, "y": 0.61}, "x = 0.48, must be 0.5: off by -0.02"),
+    ({"x": 0.49, "y": 0.6, "vx": 1.02}, "vx = 1.02, must be 1: off by 0.02"),  # of sqrt 2
+    ({"x": 0.49, "y": 0.6, "vx": 1.005}, "x = 0.49, must be 0.5: off by -0.01"),
+    ({"x": 0.49, "y": 0.6, "vy": -1.1}, "vy = -1.1, must be -1: off by -0.1"),
+    ({"t": 1.125, "x": 0.49, "y": 0.6}, "t = 1.125, must be 1: off by 0.12"),
+    ({"x": 0.49, "y": 0.6, "wall": None}, "x = 0.49, must be 0.5: off by -0.01"),
+    ({"x": 0.49, "y": 0.6, "wall": "arc"}, "wall = arc, must be None"),
+]
+
+
+@pytest.mark.parametrize(("given", "said"), FALSE_STEPS, ids=range(len(FALSE_STEPS)))
+def test_the_title_of_a_false_step_names_what_is_off_most(figures, given, said):
+    """Times are measured by the time of the step, places by the table's size, velocities by the speed."""
+    state, truth = State(0.0, 0.1, 0.2, 3.0, 4.0), Horizon(1.0, 0.5, 0.6, 1.0, -1.0)
+    check_page.draw_step(load("moving-cap"), state, truth, given, "step 7")
+    assert figures[0].get_suptitle() == f"step 7: {said}"
+
+
+def test_at_time_0_and_at_rest_an_error_is_its_own_measure(figures):
+    state, truth = State(-1.0, 0.1, 0.2, 0.0, 0.0), Horizon(0.0, 0.1, 0.2, 0.0, 0.0)
+    for given, said in (
+        ({"t": 0.1, "x": 0.11, "y": 0.2}, "t = 0.1, must be 0: off by 0.1"),
+        ({"x": 0.11, "y": 0.2, "vy": 0.2}, "vy = 0.2, must be 0: off by 0.2"),
+    ):
+        check_page.draw_step(load("moving-cap"), state, truth, given, "step 1")
+        assert figures[-1].get_suptitle() == f"step 1: {said}"
+
+
 def test_a_page_lists_failures_first_and_else_the_least_precise(monkeypatch):
     failed = [a_result(f"cap/{k}", "fail", answer={}) for k in range(10)]
     assert check_page._worst(a_run(*GOOD, *failed)) == failed[:8]

@@ -394,7 +394,7 @@ FALSE_STEPS = [  # of a step to x = 0.5, y = 0.6, vx = 1, vy = -1 at t = 1: what
     ({"x": 0.5, "y": 0.61}, "y = 0.61, must be 0.6: off by 0.01"),
     ({"x": 0.48, "y": 0.61}, "x = 0.48, must be 0.5: off by -0.02"),
     ({"x": 0.49, "y": 0.6, "vx": 1.02}, "vx = 1.02, must be 1: off by 0.02"),  # of sqrt 2
-    ({"x": 0.49, "y": 0.6, "vx": 1.005}, "x = 0.49, must be 0.5: off by -0.01"),
+    ({"x": 0.49, "y": 0.6, "vx": 1.004}, "x = 0.49, must be 0.5: off by -0.01"),
     ({"x": 0.49, "y": 0.6, "vy": -1.1}, "vy = -1.1, must be -1: off by -0.1"),
     ({"t": 1.125, "x": 0.49, "y": 0.6}, "t = 1.125, must be 1: off by 0.12"),
     ({"x": 0.49, "y": 0.6, "wall": None}, "x = 0.49, must be 0.5: off by -0.01"),

@@ -207,6 +207,20 @@ REFUSED: list[Any] = [
     (f"{ONE} --dask tcp://here:1", ["--dask", "needs --out"]),
     (f"{ONE} --block 8", ["--block", "needs --out"]),
     (f"{ONE} --phases 0.5", ["--phases", "needs --out"]),
+    *(
+        (f"check {files} {more}", [given, NOTHING, "questions and answers are in files"])
+        for files in ("--questions asked.jsonl", "--questions asked", "--answers ../good.csv")
+        for more, given in (
+            ("-- true", "COMMAND = ['true']"),
+            ("--groups step", "--groups = 'step'"),
+            ("--known-failures known.txt", "--known-failures = known.txt"),
+        )
+    ),
+    ("check --questions asked.jsonl --json r.json", ["r.json", NOTHING, "nothing is graded yet"]),
+    ("check --questions asked.txt", ["--questions = 'asked.txt', must end in .jsonl, or be a folder"]),
+    ("check --questions ..", ["--questions = '..' is not empty, must be a new folder"]),
+    ("check --questions asked.jsonl --level hard", ["level = 'hard'", "core, extended, stress"]),
+    ("check --answers absent.jsonl", ["answers 'absent.jsonl' cannot be read: No such file"]),
     ("scenes moving-cap --toml --json", ["--toml and --json"]),
     ("bench --workload all", ["--workload = 'all'", "needs --table"]),
     ("bench --table a.json --quick", ["--quick", "--table measures nothing"]),

@@ -27,6 +27,7 @@ from mushrooms.figures import energies, orbits as pictures, style, table as tabl
 from mushrooms.figures.heating import Loop, fastest, moving_cap, phase_diagram, supremum, switched
 from mushrooms.reports.page import as_json, typeset
 from scene import BangBang, Mushroom, load
+from scene.geometry import table_at
 from scene.laws import value
 
 STATIC = scenes.load("frozen-mushroom")
@@ -55,6 +56,16 @@ def test_an_orbit_is_the_particle_of_the_ensemble(moving):
         whole = fast.trajectory(MOVING, orbit.start, 10**6, math.tau).outcome
         assert isinstance(whole, scenes.Horizon)
         assert whole.x == pytest.approx(ensemble.x[i], abs=1e-6)
+
+
+@pytest.mark.parametrize("crossings", [60.0, 4.0])
+def test_a_particle_of_the_usual_energy_crosses_the_table_so_often_in_a_cycle(crossings):
+    """A table at rest has no cycle: there the speed is 1 for sixty crossings."""
+    for scene in (MOVING, load("fermi-ulam"), load("fixed-cap-clockwise")):
+        speed = (2 * orbits.usual_energy(scene, crossings)) ** 0.5
+        assert speed * scene.period == pytest.approx(crossings * table_at(fp, scene, 0.0).size)
+    assert (2 * orbits.usual_energy(STATIC, crossings)) ** 0.5 == pytest.approx(crossings / 60)
+    assert orbits.usual_energy(MOVING) == orbits.usual_energy(MOVING, 60.0)
 
 
 def test_places_between_collisions_are_on_the_path(moving):

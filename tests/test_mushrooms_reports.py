@@ -18,6 +18,7 @@ from support.artists import bars, line, said, words, xy
 
 import conformance
 import fast
+import reference
 import theory
 from conformance import vectors
 from conformance.audit.claim import Check
@@ -594,3 +595,16 @@ def test_a_good_run_is_shown_without_objections(capsys, monkeypatch):
     text = shown_on_a_terminal(capsys, monkeypatch, a_run(*GOOD, *many))
     assert "... and 3 more: --json FILE has them all." in text
     assert text.count(": fail: wrong") == 20
+
+
+def test_the_width_of_a_proved_path_is_that_of_its_places_and_velocities():
+    """Places are measured by their distance from the middle, velocities by the speed: the worse counts."""
+    path = reference.trajectory(load("moving-cap"), State(0.2, 0.1, 0.3, 30.0, 5.0), 12, working=30)
+    for point, step in zip(bench._places(path), path.steps, strict=True):
+        _, x, y, vx, vy = step.after
+        size = math.hypot(float(x.centre()), float(y.centre()))
+        speed = math.hypot(float(vx.centre()), float(vy.centre()))
+        units = size, size, speed, speed
+        worst = max(float(c.width()) / unit for c, unit in zip(step.after[1:], units, strict=True))
+        assert float(point.width) == pytest.approx(worst, rel=1e-12)
+        assert (point.wall, point.x, point.vy) == (step.wall, x.centre(), vy.centre())

@@ -269,7 +269,7 @@ def test_an_answer_of_another_number_of_outcomes_counts_as_one_question():
 
 
 # A repeat lasts .1 s, and an answer .05 s more, the delay. What a program says otherwise, in nanoseconds:
-# of a first start, of each of many repeats, of the least of them, of a path twice as long. What is said of it.
+# of a first start, of each of many repeats, of the least of them, of a path twice as long; and the objection.
 CLOCKS = [
     ({}, ""),
     ({"many": 0.026e9}, ""),

@@ -350,11 +350,13 @@ def test_states_are_asked_about_up_to_a_time_that_is_near(profile):
 
 TAGGED = {"type": "object", "properties": {"kind": {"enum": ["wave"]}, "x": {"type": "number"}}}
 TWICE = {"type": "object", "properties": {"kind": {"enum": ["wave"]}, "wall": {"enum": ["arc"]}}}
+FIRST = {"type": "object", "properties": {"kind": {"enum": ["wave", "legs"]}}}
 FORMS: list[tuple[dict[str, Any], Any, bool]] = [
     ({"type": "null"}, None, True), ({"type": "null"}, 1.0, False), ({"type": "number"}, None, False),
     ({"type": "boolean"}, True, True), ({"type": "integer"}, True, False), ({"type": "number"}, True, False),
     ({"type": "integer"}, 1, True), ({"type": "number"}, 1, True), ({"type": "integer"}, 1.0, False),
     ({"type": "number"}, 1.0, True), ({"type": "string"}, "1.0", True), ({"type": "number"}, "1.0", False),
+    (FIRST, {"kind": "wave"}, True), (FIRST, {}, True), (FIRST, {"kind": "legs"}, True),
     ({"enum": ["arc"]}, "arc", True), ({"enum": ["arc"]}, 1.0, False), ({"type": "array"}, [1.0], True),
     ({"type": "array"}, (1.0,), True), ({"type": "object"}, [1.0], False), ({"type": "array"}, {}, False),
     ({"type": ["number", "null"]}, None, True), ({"type": ["number", "null"]}, "x", False),

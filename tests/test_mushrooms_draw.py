@@ -177,6 +177,32 @@ def test_a_chaotic_orbit_stretches_and_an_island_keeps_its_angle_and_does_not():
         lyapunov.stretching(whispering(n=31))
 
 
+def test_a_stretch_is_that_of_one_deviation_in_units_of_the_table_and_the_speed(monkeypatch):
+    """It begins at right angles to the motion. Against the product of all Jacobians, and blocks by hand."""
+    [orbit] = orbits.follow(MOVING, 37, energy=2.0, seed=4)
+    random = np.random.default_rng(1).normal(0.0, 1.0, (37, 5, 5))
+    monkeypatch.setattr(lyapunov, "jacobians", lambda *_: random)
+    found = lyapunov.stretching(orbit)
+    states = orbit.states()
+    size = max(np.ptp(states[:, 1]), np.ptp(states[:, 2]))
+    speeds = [math.hypot(*row[3:]) for row in states.tolist()]
+    assert max(speeds) > 1.2 * min(speeds)
+    vx, vy = states[0, 3:] / speeds[0]
+    deviation = np.array([0.0, -size * vy, size * vx, -speeds[0] * vy, speeds[0] * vx]) / math.sqrt(2)
+    sizes = [1.0]
+    for matrix, speed in zip(random, speeds[1:], strict=True):
+        deviation = matrix @ deviation
+        t, x, y, *turn = deviation
+        sizes.append(math.hypot(t * speed / size, x / size, y / size, *(v / speed for v in turn)))
+    logs = np.diff(np.log(sizes))
+    assert found.logs == pytest.approx(logs)
+    assert found.exponents == pytest.approx([logs[: k + 1].mean() for k in range(37)])
+    blocks = [logs[5 + 2 * k : 7 + 2 * k].mean() for k in range(16)]
+    assert found.error == pytest.approx(np.std(blocks, ddof=1) / 4)
+    assert found.exponent == pytest.approx(logs.mean())
+    assert found.flight == pytest.approx((states[-1, 0] - states[0, 0]) / 37)
+
+
 @pytest.mark.parametrize(
     ("outcome", "words"),
     [

@@ -481,6 +481,20 @@ def test_summaries_are_of_what_was_followed():
     assert (nothing["collision_time"], nothing["ns_per_collision"]) == (None, 2e9)
 
 
+PULLS = [  # found, predicted, standard error, possible error of theory; the difference in both
+    (2.0, 1.0, 0.3, 0.4, 2.0), (1.0, 2.0, 0.3, 0.4, -2.0), (1.0, 1.0, 0.3, 0.4, 0.0),
+    (2.0, 1.0, 0.5, 0.0, 2.0), (2.0, 1.0, 0.0, 0.5, 2.0), (2.0, 1.0, 0.0, 0.0, None),
+    (None, 1.0, 0.3, 0.4, None), (2.0, 1.0, None, 0.4, None), (2.0, 1.0, 0.3, None, None),
+    (1.0, 0.0, 1.5, 0.0, 0.667),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("found", "wanted", "error", "left_out", "pull"), PULLS, ids=range(len(PULLS)))
+def test_a_difference_is_told_in_the_errors_that_there_are(found, wanted, error, left_out, pull):
+    """None where there is none, or where one is not known; rounded to three decimals."""
+    assert summary._pull(found, wanted, error, left_out) == pull
+
+
 @pytest.mark.parametrize("n_cycles", [1, 3])
 def test_a_prediction_of_a_run_goes_from_its_energy_towards_the_limit(n_cycles):
     """A cycle adds what finite energy does as E^(-1/2), which falls by the mean of exp(-s / 2) each time."""

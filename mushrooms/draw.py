@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import fast
-from conformance.audit.runs import is_scene, scene_named
 from conformance.files import write_file
 from mushrooms import orbits
+from mushrooms.audit.runs import is_scene, scene_named
 from mushrooms.figures import energies, orbits as pictures, style, table as tables
 from mushrooms.output import Watch, announce_compilation, check_file, progress_bar, refuse_unheeded
 from mushrooms.simulate import draw_energies

@@ -16,7 +16,6 @@ from rich.table import Column, Table
 import fast
 import reference
 from conformance import vectors, verify as verifier
-from conformance.audit.runs import scene_named
 from conformance.cases.attacks import UnderAttack, run
 from conformance.cases.certify import judge
 from conformance.cases.draw import wire_form
@@ -29,6 +28,7 @@ from conformance.suite.process import CheckFailure
 from conformance.suite.run import N_FRESH, Transform, draw_transform
 from conformance.suite.session import Session, outcomes_of
 from conformance.suite.sheet import read_number, read_rows
+from mushrooms.audit.runs import scene_named
 from mushrooms.check import format_outcome
 from mushrooms.output import announce_compilation, check_file, new_console, print_table, progress_bar
 from mushrooms.tables import check_digest

@@ -9,7 +9,7 @@ from rich.table import Column, Table
 
 import scene as scenes
 import theory
-from conformance.audit.runs import SCENES, scene_named
+from mushrooms.audit.runs import SCENES, scene_named
 from mushrooms.output import new_console, print_pairs, print_table, progress_bar
 from mushrooms.store.summary import expected_collisions
 from scene import BadInput, Scene

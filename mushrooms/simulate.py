@@ -12,9 +12,9 @@ import numpy as np
 import typer
 
 import fast
-from conformance.audit.runs import scene_named
 from conformance.files import named, write_file
 from fast.validation import check_phases
+from mushrooms.audit.runs import scene_named
 from mushrooms.output import (
     Watch,
     announce_compilation,

@@ -11,9 +11,9 @@ from numba.core import event
 from support.entries import kept_entries
 
 import fast
-from conformance.audit import session
 from fast.kernel import fine_step, follow, path, scalar_step, worker
 from mushrooms import bench, orbits, output, questions
+from mushrooms.audit import session
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled without the compiler")
 ROOT = Path(__file__).parent.parent

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 import fast
 from conformance.files import write_file
 from mushrooms import orbits
-from mushrooms.audit.runs import is_scene, scene_named
 from mushrooms.figures import energies, orbits as pictures, style, table as tables
 from mushrooms.output import Watch, announce_compilation, check_file, progress_bar, refuse_unheeded
 from mushrooms.simulate import draw_energies
@@ -18,6 +17,7 @@ from mushrooms.store.run import is_run, open_run
 from mushrooms.tables import SUFFIXES
 from scene import BadInput, Scene, Stem
 from scene.laws import bounds
+from scene.named import is_scene, scene_named
 from scene.tables import laws
 
 

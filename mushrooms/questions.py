@@ -28,11 +28,11 @@ from conformance.suite.process import CheckFailure
 from conformance.suite.run import N_FRESH, Transform, draw_transform
 from conformance.suite.session import Session, outcomes_of
 from conformance.suite.sheet import read_number, read_rows
-from mushrooms.audit.runs import scene_named
 from mushrooms.check import format_outcome
 from mushrooms.output import announce_compilation, check_file, new_console, print_table, progress_bar
 from mushrooms.tables import check_digest
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined, from_data
+from scene.named import scene_named
 from scene.refusal import shown
 
 

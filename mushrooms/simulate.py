@@ -14,7 +14,6 @@ import typer
 import fast
 from conformance.files import named, write_file
 from fast.validation import check_phases
-from mushrooms.audit.runs import scene_named
 from mushrooms.output import (
     Watch,
     announce_compilation,
@@ -31,6 +30,7 @@ from mushrooms.store.spec import RunSpec
 from mushrooms.store.summary import RunTally, careful_note, explain_limit, gain_of, measured, tally_of
 from scene import BadInput
 from scene.mouth import one_cycle
+from scene.named import scene_named
 
 Gains = Callable[[], Iterable[Any]]  # returns ln(E/E0) after each cycle, block by block
 MOST_IN_MEMORY = 10**8  # particles

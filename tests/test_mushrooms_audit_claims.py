@@ -34,11 +34,12 @@ from mushrooms.audit.frozen import (
     measured,
     passages,
 )
-from mushrooms.audit.runs import RUNS, SCENES, Sample, draw, scene_of
+from mushrooms.audit.runs import RUNS, Sample, draw, scene_of
 from mushrooms.audit.session import AuditSettings, conduct
 from mushrooms.audit.tolerances import MAX_TESTS, N_SIGMA, close, fits, half_unit, power
 from scene import BangBang, Mushroom, load
 from scene.geometry import table_at
+from scene.named import SCENES
 from theory.finite_energy.rates import MEMORIES, PHASES, Rates, frozen_rates
 
 # They follow single particles, slow ones, flows, other tables or upright ones: not the stand-in's matter.

@@ -30,7 +30,6 @@ from fast.kernel.follow import LANE_ROWS
 from mushrooms import output
 from mushrooms.audit import ensemble_command
 from mushrooms.audit.ensemble_command import Options
-from mushrooms.audit.runs import SCENES
 from mushrooms.main import run
 from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct
@@ -45,6 +44,7 @@ from mushrooms.store.summary import (
     measured,
 )
 from scene import Fourier, Mushroom, load
+from scene.named import SCENES
 
 IN_MEMORY = ["simulate", "moving-cap", "--particles", 60, "--energy", 1e4, "--threads", 1, "--json"]
 

@@ -17,8 +17,8 @@ from scipy.stats import norm
 import fast
 import theory
 from mushrooms.audit.frozen import MEASURED
-from mushrooms.audit.runs import scene_named
 from mushrooms.audit.tolerances import Mean, mean, share
+from scene.named import scene_named
 from theory.finite_energy.one_cycle import FiniteEnergy
 
 LEVEL = 0.01

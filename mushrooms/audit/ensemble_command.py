@@ -28,13 +28,14 @@ from mushrooms.audit.ensemble_checks import (
     reversal,
 )
 from mushrooms.audit.page import expected_text, figures_text, power_text, pull, to_json
-from mushrooms.audit.runs import BoolArray, FloatArray, scene_named
+from mushrooms.audit.runs import BoolArray, FloatArray
 from mushrooms.figures import energies
 from mushrooms.figures.style import ORANGE, SKY, STYLE, new_figure, svg
 from mushrooms.output import writable_folder, write_report
 from mushrooms.reports.page import embed, render
 from mushrooms.store.run import GROUP, UNREADABLE, folder_of, open_run
 from mushrooms.tables import check_digest, import_arrow
+from scene.named import scene_named
 from scene.refusal import BadInput
 from scene.tables import Mushroom
 

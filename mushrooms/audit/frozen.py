@@ -31,11 +31,11 @@ import fast
 import scene as scenes
 from conformance.files import write_file
 from fast.paths import carry
-from mushrooms.audit.runs import scene_named
 from mushrooms.audit.tolerances import FloatArray, Mean, mean
 from scene import Fourier, Horizon, Mushroom, State
 from scene.geometry import TableAt, table_at
 from scene.laws import value
+from scene.named import scene_named
 from scene.tables import laws
 from theory.finite_energy.rates import FILE, MEMORIES, N_PHASES, PHASES, SPEEDS, Rates, kick_rates, pace
 from theory.volumes import volumes_at

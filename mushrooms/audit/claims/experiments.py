@@ -23,7 +23,7 @@ from mushrooms.audit.claims.finite_energy import (
     width_as_predicted,
 )
 from mushrooms.audit.claims.misprints import ZERO, loop_area
-from mushrooms.audit.runs import SCENES, Sample, scene_of
+from mushrooms.audit.runs import Sample, scene_of
 from mushrooms.audit.tolerances import (
     LEVEL,
     N_SIGMA,
@@ -40,6 +40,7 @@ from mushrooms.audit.tolerances import (
     stated,
 )
 from scene.laws import bounds
+from scene.named import SCENES
 from scene.tables import laws
 
 MOVING = ("moving-cap@1e6", "moving-cap@1e7")

@@ -9,7 +9,8 @@ from rich.table import Column, Table
 
 import scene as scenes
 import theory
-from mushrooms.output import new_console, print_pairs, print_table, progress_bar
+from mushrooms.output import new_console, print_pairs, print_table
+from mushrooms.progress import progress_bar
 from mushrooms.store.summary import expected_collisions
 from scene import BadInput, Scene
 from scene.load import catalogue_text, read_data

@@ -24,7 +24,7 @@ from mushrooms.audit.claim import AuditSteppers, Check, Finding
 from mushrooms.audit.claims import all_claims, select_claims
 from mushrooms.audit.runs import RUNS, Sample, Simulation, draw, run_seed, scene_of
 from mushrooms.audit.session import AuditResult, AuditSettings
-from mushrooms.output import locked
+from mushrooms.folders import locked
 from mushrooms.store import conduct
 from mushrooms.store.run import attributes_of
 from scene.named import SCENES

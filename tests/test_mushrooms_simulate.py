@@ -27,11 +27,11 @@ from support.refusals import assert_refused
 import fast
 import theory
 from fast.kernel.follow import LANE_ROWS
-from mushrooms import output
+from mushrooms import progress
 from mushrooms.audit import ensemble_command
 from mushrooms.audit.ensemble_command import Options
+from mushrooms.folders import LOCK, locked
 from mushrooms.main import run
-from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct
 from mushrooms.store.run import DESCRIPTION, GROUP, MARKERS, StoredRun
 from mushrooms.store.spec import RunSpec, shape_of
@@ -236,9 +236,9 @@ def test_a_block_is_reported_at_once_and_two_are_in_memory(tmp_path, monkeypatch
 def test_progress_tells_the_time_left(capsys, monkeypatch):
     """From the first call on: what was there before took no time."""
     now = iter(range(0, 10**6, 60))
-    monkeypatch.setattr(output, "CLOCK", lambda: float(next(now)))
-    with output.progress_bar() as bar:
-        watch = output.Watch(bar, "run", "particles")
+    monkeypatch.setattr(progress, "CLOCK", lambda: float(next(now)))
+    with progress.progress_bar() as bar:
+        watch = progress.Watch(bar, "run", "particles")
         for n_done in (500, 1000, 1500):
             watch.update(n_done, 2000)
     told = "run: 1,000 of 2,000 particles, 2 minutes left\nrun: 1,500 of 2,000 particles, 60 seconds left\n"

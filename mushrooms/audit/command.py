@@ -10,7 +10,6 @@ from functools import cache, partial
 from pathlib import Path
 
 import fast
-from conformance.files import named
 from fast.ensemble import SHARE
 from mushrooms.audit import session
 from mushrooms.audit.claim import AuditSteppers, Claim
@@ -19,19 +18,15 @@ from mushrooms.audit.ensemble_command import Options, audit_ensemble
 from mushrooms.audit.page import to_data, to_html, to_json, to_text
 from mushrooms.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
 from mushrooms.audit.session import AuditResult, AuditSettings
-from mushrooms.output import (
-    Watch,
-    announce_compilation,
-    locked,
-    progress_bar,
-    refuse_unheeded,
-    writable_folder,
-    write_report,
-)
+from mushrooms.folders import locked, writable_folder
+from mushrooms.output import write_report
+from mushrooms.progress import Watch, announce_compilation, progress_bar
 from mushrooms.store import conduct
 from mushrooms.store.run import is_run
 from mushrooms.store.spec import RunSpec
 from scene import BadInput, Scene
+from scene.files.writer import named
+from scene.refusal import refuse_unheeded
 
 
 def audit_claims(

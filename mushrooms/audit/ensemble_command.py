@@ -15,7 +15,6 @@ import numpy as np
 import zarr
 from matplotlib import rc_context
 
-from conformance.suite.sheet import read_names, read_number, read_rows
 from mushrooms.audit.claim import Check
 from mushrooms.audit.ensemble_checks import (
     GivenEnsemble,
@@ -31,10 +30,11 @@ from mushrooms.audit.page import expected_text, figures_text, power_text, pull, 
 from mushrooms.audit.runs import BoolArray, FloatArray
 from mushrooms.figures import energies
 from mushrooms.figures.style import ORANGE, SKY, STYLE, new_figure, svg
-from mushrooms.output import writable_folder, write_report
+from mushrooms.folders import writable_folder
+from mushrooms.output import write_report
 from mushrooms.reports.page import embed, render
 from mushrooms.store.run import GROUP, UNREADABLE, folder_of, open_run
-from mushrooms.tables import check_digest, import_arrow
+from scene.files.tables import check_digest, import_arrow, read_names, read_number, read_rows
 from scene.named import scene_named
 from scene.refusal import BadInput
 from scene.tables import Mushroom

@@ -29,10 +29,10 @@ from scipy.optimize import nnls
 
 import fast
 import scene as scenes
-from conformance.files import write_file
 from fast.paths import carry
 from mushrooms.audit.tolerances import FloatArray, Mean, mean
 from scene import Fourier, Horizon, Mushroom, State
+from scene.files.writer import write_file
 from scene.geometry import TableAt, table_at
 from scene.laws import value
 from scene.named import scene_named

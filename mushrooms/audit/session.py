@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import fast
 import scene
 import theory
-from conformance.files import sealed, unsealed, write_file
 from mushrooms.audit.claim import (
     AuditSteppers,
     Claim,
@@ -28,6 +27,7 @@ from mushrooms.audit.claim import (
 )
 from mushrooms.audit.claims import all_claims
 from mushrooms.audit.runs import RUNS, Progress, Sample, Simulate, Size, draw
+from scene.files.writer import sealed, unsealed, write_file
 from scene.refusal import check_seed
 
 # Modules of this folder that decide nothing: import-linter holds that none that decides imports them.

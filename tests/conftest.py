@@ -98,7 +98,9 @@ def _compiled_once() -> None:
 
     def one_at_a_time(entry: Dispatcher) -> Callable[[Any], Any]:
         compile_or_load, name = entry.compile, entry.py_func.__qualname__
-        lock = Path(entry.stats.cache_path) / f"{name}.lock"
+        folder = cache_folder(entry)
+        assert folder is not None
+        lock = folder / f"{name}.lock"
 
         def compile_alone(signature: Any) -> Any:
             lock.parent.mkdir(parents=True, exist_ok=True)

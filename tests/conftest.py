@@ -11,7 +11,6 @@ import json
 import os
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
@@ -23,6 +22,7 @@ from support.entries import kept_entries
 import fast
 from conformance.suite import run as suite
 from conformance.vectors import Vector, load
+from fast.kernel.numba_internals import cache_folder
 from fast.prepared import prepare
 from mushrooms.main import run
 from scene import Scene

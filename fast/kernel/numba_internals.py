@@ -1,8 +1,8 @@
 """What this package uses of numba's inside, which numba does not document and may change.
 
-No other file names any of it. `tests/test_fast_numba_internals.py` tests each name for the meaning that we rely
-on: a release of numba that changes one fails there first, by name. What is not handled: the events of
-`numba.core.event`, which numba documents.
+No other file names any of it. `tests/test_fast_numba_internals.py` tests each name for the
+meaning that we rely on: a release of numba that changes one fails there first, by name. The events
+of `numba.core.event` are not here, because numba documents them.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from numba.extending import intrinsic as numba_intrinsic
 # A function for kernels whose code is written by hand; numba types it by what it returns.
 intrinsic: Callable[[Callable[..., Any]], Any] = numba_intrinsic
 
-# Options of `njit`. A function that only kernels call needs no wrapper for C. The caller of a kernel holds its
-# arrays while it runs, so no references are counted: each count is an atomic operation, and much to compile.
-# So a kernel cannot allocate.
+# Options of `njit`. A function that only kernels call needs no wrapper for C. The caller of a kernel
+# holds its arrays while it runs, so no references are counted: each count is an atomic operation,
+# and much to compile. So a kernel cannot allocate.
 UNWRAPPED: dict[str, Any] = {"no_cfunc_wrapper": True}
 UNCOUNTED: dict[str, Any] = {"_nrt": False}
 

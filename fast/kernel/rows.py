@@ -93,9 +93,7 @@ def put_particle(a: FloatArray, i: np.int64, p: Particle) -> None:
 
 
 @kernel
-def copy_rows(
-    a: FloatArray, i: Integer, b: FloatArray, j: Integer, first: Integer, last: Integer
-) -> None:
+def copy_rows(a: FloatArray, i: Integer, b: FloatArray, j: Integer, first: Integer, last: Integer) -> None:
     """Copy what lane i of one pool holds to lane j of another, from one row up to another."""
     for row in range(first, last, STRIDE):
         b[row + j] = a[row + i]

@@ -1,4 +1,4 @@
-"""One step of each of many given states, in compiled code: by the scalar step, or by one round of the lanes."""
+"""One step of each of many given states, compiled: by the scalar step, or by one round of the lanes."""
 
 import numpy as np
 

@@ -14,7 +14,8 @@ from support import adiabatic_particles
 
 import scene as scenes
 import theory
-from mushrooms.audit import figures, page
+from mushrooms.audit import figures
+from mushrooms.audit import page as audit_page
 from mushrooms.audit.claim import Check, Claim, Finding
 from mushrooms.audit.runs import RUNS, Sample, draw, run_seed
 from mushrooms.audit.session import AuditResult, AuditSettings
@@ -95,7 +96,7 @@ def page(result) -> str:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "ALL", [])
         patch.setattr(figures, "FIRST", figures.FIRST._replace(needs=("none",)))
-        return page.to_html(page.to_data(result), {MAIN: result.samples[MAIN]})
+        return audit_page.to_html(audit_page.to_data(result), {MAIN: result.samples[MAIN]})
 
 
 def test_the_page_has_the_numbers_of_each_check(page):
@@ -113,8 +114,8 @@ def test_claims_stand_in_groups_by_section_letter_and_number(page):
     assert re.findall("<h2>(.*?)</h2>", page)[2:5] == [
         "Claims, in the paper&#39;s order", "Misprints and gaps", "Beyond the paper",
     ]  # fmt: skip
-    assert page._place({"where": "nowhere", "id": "M3"}) == ([9], "M", 3)
-    assert page._place({"where": "secs. 3.1 and 2", "id": "D12"}) == ([3, 1], "D", 12)
+    assert audit_page._place({"where": "nowhere", "id": "M3"}) == ([9], "M", 3)
+    assert audit_page._place({"where": "secs. 3.1 and 2", "id": "D12"}) == ([3, 1], "D", 12)
 
 
 def test_the_main_numbers_are_those_of_theory_and_of_the_run(page, sample):
@@ -140,7 +141,7 @@ def test_the_main_numbers_are_those_of_theory_and_of_the_run(page, sample):
 
 
 def test_the_summary_is_these_lines(result):
-    lines = page.to_text(page.to_data(result)).splitlines()
+    lines = audit_page.to_text(audit_page.to_data(result)).splitlines()
     assert lines[:6] == [
         "! X2  refuted                       9/10  sec. 4.2",
         "      expected: confirmed",
@@ -154,14 +155,14 @@ def test_the_summary_is_these_lines(result):
 
 
 def test_false_alarms_are_bounded_by_the_comparisons_there_are(result):
-    alarms = page.to_data(result)["false_alarms"]
+    alarms = audit_page.to_data(result)["false_alarms"]
     n = sum(check.n_tests for finding in result.findings for check in finding.checks)
     assert (alarms["tests"], alarms["bound"]) == (n, pytest.approx(n * alarms["level"]))
     assert alarms["level"] == pytest.approx(math.erfc(alarms["standard_errors"] / math.sqrt(2)), rel=1e-6)
 
 
 def test_a_run_is_described_by_its_particles(result, sample):
-    data = page.to_data(result)
+    data = audit_page.to_data(result)
     found, nobody = data["runs"]
     gain = sample.s[:, 0]
     is_captured = np.isfinite(sample.t_in[:, 0]).any(axis=1)

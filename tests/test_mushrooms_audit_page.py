@@ -14,8 +14,7 @@ from support import adiabatic_particles
 
 import scene as scenes
 import theory
-from mushrooms.audit import figures
-from mushrooms.audit import page as audit_page
+from mushrooms.audit import figures, page as audit_page
 from mushrooms.audit.claim import Check, Claim, Finding
 from mushrooms.audit.runs import RUNS, Sample, draw, run_seed
 from mushrooms.audit.session import AuditResult, AuditSettings

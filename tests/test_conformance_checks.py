@@ -11,7 +11,7 @@ import pytest
 from conformance.cases.draw import Draw
 from conformance.profiles import margin
 from conformance.suite import pytest_plugin
-from conformance.suite.checks import flows, form, paths, requests, timing
+from conformance.suite.checks import bad_input, flows, form, path_judge, spelling, timing
 from conformance.suite.checks.form import Implementation, octaves
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import graded_parts
@@ -40,7 +40,7 @@ def test_one_number_is_drawn_from_each_octave(low, high):
     assert lowest < low * min(1.1, (high / low) ** 0.1)
 
 
-@pytest.mark.parametrize("make", [requests._wave, requests._legs])
+@pytest.mark.parametrize("make", [bad_input._wave, bad_input._legs])
 @pytest.mark.parametrize("off", [1.0, -1.0])
 @pytest.mark.parametrize(("bound", "far"), [(0.5, 1.5), (1.5, 0.5), (0.0, 1.0), (1.25, 0.75)])
 def test_a_law_that_is_broken_for_a_while_keeps_to_its_values(make, off, bound, far):
@@ -136,16 +136,16 @@ def test_what_comes_after_a_malformed_line_is_answered_as_before(refusal, after,
     asked = [(START, question("step", SCENE, START, 9.0))]
     side = Implementation(session, "step")
     if said is None:
-        assert requests.passed_over(side, SCENE, asked)
-        assert is_disturbed == [line for line, _ in requests.MALFORMED]
+        assert spelling.passed_over(side, SCENE, asked)
+        assert is_disturbed == [line for line, _ in spelling.MALFORMED]
     else:
         with pytest.raises((CheckFailure, AssertionError), match=said):
-            requests.passed_over(side, SCENE, asked)
+            spelling.passed_over(side, SCENE, asked)
 
 
 def test_starts_at_either_zero_go_to_every_side_that_is_open():
     """From the mouth up and down; from a base only away from it."""
-    asked = list(requests.zeros(Draw("zeros"), "step"))
+    asked = list(spelling.zeros(Draw("zeros"), "step"))
     ways = {(type(scene), start.vy > 0, start.wall) for scene, start, _, _ in asked}
     up, down = True, False
     assert ways == {(Cap, up, "base"), (Stem, down, "base"), (Mushroom, up, None), (Mushroom, down, None)}
@@ -329,7 +329,7 @@ SPOILT: list[tuple[dict[str, Any], str]] = [
 @pytest.mark.parametrize(("changes", "said"), SPOILT, ids=range(len(SPOILT)))
 def test_a_hit_to_which_no_flight_led_is_named_by_its_flaw(changes, said):
     right = Collision(dt=0.5, t=0.5, x=0.125, y=0.0, vx=0.0, vy=1.0, wall="base")
-    flaw = paths.flaw_of(SCENE, FALLING, [msgspec.structs.replace(right, **changes)], {})
+    flaw = path_judge.flaw_of(SCENE, FALLING, [msgspec.structs.replace(right, **changes)], {})
     assert flaw == (f"outcome 1 {said}" if said else "")
 
 
@@ -337,7 +337,7 @@ def test_a_hit_to_which_no_flight_led_is_named_by_its_flaw(changes, said):
 def test_states_are_asked_about_up_to_a_time_that_is_near(profile):
     """At once or soon after; a trajectory has time to go on. A start that is late is so by its own time."""
     ahead = set()
-    for _, asked, why in requests.bad_states(Draw("states"), profile):
+    for _, asked, why in bad_input.bad_states(Draw("states"), profile):
         starts = asked["states"] if profile == "flow" else [asked["state"]]
         late = {round(start["t"] - asked["t_end"], 12) for start in starts}
         if "begins after" in why:
@@ -370,13 +370,13 @@ FORMS: list[tuple[dict[str, Any], Any, bool]] = [
 @pytest.mark.parametrize(("form", "value", "is_meant"), FORMS, ids=range(len(FORMS)))
 def test_a_form_of_the_schema_is_meant_by_values_of_its_type_and_tag(form, value, is_meant):
     """A whole number is a number too; an object whose tag is missing may be of any form."""
-    assert requests._fits(form, value) is is_meant
+    assert bad_input._fits(form, value) is is_meant
 
 
 @pytest.mark.parametrize("profile", ["step", "trajectory", "flow"])
 def test_bad_states_are_bad_for_what_is_said_alone(profile):
     """Only a start that is late on purpose is asked about up to an earlier time."""
-    for scene, asked, why in requests.bad_states(Draw("states"), profile):
+    for scene, asked, why in bad_input.bad_states(Draw("states"), profile):
         starts = asked["states"] if profile == "flow" else [asked["state"]]
         assert all((asked["t_end"] < start["t"]) == ("begins after" in why) for start in starts), (scene, why)
 

@@ -14,11 +14,10 @@ from support import adiabatic_particles
 
 import scene as scenes
 import theory
-from conformance.audit.claim import Check, Claim, Finding
-from conformance.audit.runs import RUNS, Sample, draw, run_seed
-from conformance.audit.session import AuditResult, AuditSettings
-from mushrooms.figures import by_claim
-from mushrooms.reports import audit_page
+from mushrooms.audit import figures, page as audit_page
+from mushrooms.audit.claim import Check, Claim, Finding
+from mushrooms.audit.runs import RUNS, Sample, draw, run_seed
+from mushrooms.audit.session import AuditResult, AuditSettings
 
 MAIN, LOST = "moving-cap@1e7", "ergodic@1e6"
 # A check of a claim, and what stands in the columns Found, Expected, Pull, Band and Detects.
@@ -94,8 +93,8 @@ def rows_of(table: str) -> list[list[str]]:
 @pytest.fixture(scope="module")
 def page(result) -> str:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(by_claim, "ALL", [])
-        patch.setattr(by_claim, "FIRST", by_claim.FIRST._replace(needs=("none",)))
+        patch.setattr(figures, "ALL", [])
+        patch.setattr(figures, "FIRST", figures.FIRST._replace(needs=("none",)))
         return audit_page.to_html(audit_page.to_data(result), {MAIN: result.samples[MAIN]})
 
 

@@ -26,7 +26,7 @@ from conformance.harness.examples import find_compiler
 from conformance.suite import pytest_suite, run as suite
 from conformance.suite.checks import flows
 from conformance.suite.session import Session
-from mushrooms import bench, output
+from mushrooms import bench, progress
 from mushrooms.reports import bench_page, check_page
 from scene import State
 from scene.refusal import shown
@@ -44,7 +44,7 @@ def _few(monkeypatch):
     monkeypatch.setattr(suite, "choose", lambda *_: found)
     monkeypatch.setitem(flows.SIZES, "core", flows.Size(20, 50.0, 0.5))
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
-    monkeypatch.setattr(output, "FIRST", math.inf)
+    monkeypatch.setattr(progress, "FIRST", math.inf)
     monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1] + workloads.RULES[2:3])
     monkeypatch.setattr(bench, "QUESTIONS", {"quick": 2, "full": 64})
     monkeypatch.setattr(bench, "FURTHER", {"quick": 40, "full": 2000})
@@ -118,8 +118,8 @@ def test_a_bad_stepper_is_not_and_its_fault_is_told(command_line, tmp_path, step
 
 
 def test_a_piped_run_tells_on_stderr_how_far_it_is(command_line, monkeypatch):
-    monkeypatch.setattr(output, "FIRST", 0.0)
-    monkeypatch.setattr(output, "EVERY", 0.0)
+    monkeypatch.setattr(progress, "FIRST", 0.0)
+    monkeypatch.setattr(progress, "EVERY", 0.0)
     _, _, err = command_line("check", "--groups", "static-stem", "--", *command("honest"))
     lines = err.splitlines()
     assert len(lines) > 5

@@ -20,11 +20,12 @@ from support.artists import bars, labels, line, measured, said, xy
 from support.figure_words import CLAIMS
 
 import theory
-from conformance.audit.claims import finite_energy
-from conformance.audit.claims.misprints import loop_area, signed_area
-from conformance.audit.runs import RUNS, Sample, draw, scene_of
 from mushrooms import orbits
-from mushrooms.figures import by_claim, style
+from mushrooms.audit import figures
+from mushrooms.audit.claims import finite_energy
+from mushrooms.audit.claims.misprints import loop_area, signed_area
+from mushrooms.audit.runs import RUNS, Sample, draw, scene_of
+from mushrooms.figures import style
 from mushrooms.figures.energies import ROOM
 from scene import load
 from scene.laws import value
@@ -32,16 +33,16 @@ from scene.tables import laws
 
 N = 250  # particles of a run
 N_DRAWN = 6_000  # sums of cycles
-PICTURES = {picture.claim: picture for picture in by_claim.ALL}
+PICTURES = {picture.claim: picture for picture in figures.ALL}
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _fewer() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        for module in (finite_energy, by_claim):
+        for module in (finite_energy, figures):
             patch.setattr(module, "N_DRAWN", N_DRAWN)
-        patch.setattr(by_claim, "N_ORBITS", 6)
-        patch.setattr(by_claim, "N_HITS", 60)
+        patch.setattr(figures, "N_ORBITS", 6)
+        patch.setattr(figures, "N_HITS", 60)
         finite_energy.summed.cache_clear()
         yield
         finite_energy.summed.cache_clear()
@@ -69,8 +70,8 @@ def figure(sample: Callable[[str], Sample]) -> Callable[[str], Figure]:
             picture = PICTURES[claim]
             with pytest.MonkeyPatch.context() as patch:
                 if claim == "X7":  # its right panel is X1's, of a theory that takes seconds
-                    patch.setattr(by_claim, "_energies", lambda axes, *_: axes.plot(0, 0, label="as in X1"))
-                found = by_claim.draw_picture(picture, {name: sample(name) for name in picture.needs})
+                    patch.setattr(figures, "_energies", lambda axes, *_: axes.plot(0, 0, label="as in X1"))
+                found = figures.draw_picture(picture, {name: sample(name) for name in picture.needs})
             assert found is not None
             known[claim] = found
         return known[claim]
@@ -100,13 +101,13 @@ def test_every_figure_is_looked_at_here() -> None:
 
 def test_a_figure_needs_its_runs_and_shows_more_where_they_are(sample: Callable[[str], Sample]) -> None:
     picture = PICTURES["X4"]
-    assert by_claim.draw_picture(picture, {}) is None
-    assert by_claim.draw_picture(by_claim.FIRST, {}) is None
+    assert figures.draw_picture(picture, {}) is None
+    assert figures.draw_picture(figures.FIRST, {}) is None
     shown: list[tuple[Sample, ...]] = []
     listed = picture._replace(draw=lambda _, *samples: shown.append(samples))
     slower, faster = picture.needs[0], picture.more[0]
     some = {faster: sample(slower), "else": sample(slower), slower: sample("ergodic@1e7")}
-    by_claim.draw_picture(listed, some)
+    figures.draw_picture(listed, some)
     assert [one.run.name for one in shown[0]] == ["ergodic@1e7", slower]
 
 
@@ -194,12 +195,12 @@ def test_means_approach_the_theory_with_the_energy(
     panels = figure("M9").axes
     samples = [sample(f"moving-cap@1e{k}") for k in range(3, 9)]
     limit = theory.predict(load("moving-cap"))
-    figures = (
+    drawn = (
         (lambda one: one.s[:, 0], float(limit.m1)),
         (lambda one: np.isnan(one.t_in[:, 0]).all(axis=1).astype(float), float(limit.p_nc)),
         (lambda one: np.exp(-one.s[:, 0] / 2), float(theory.unbiased_mean(load("moving-cap")))),
     )
-    for axes, (of, truth) in zip(panels, figures, strict=True):
+    for axes, (of, truth) in zip(panels, drawn, strict=True):
         found = measured(axes)
         assert found.x == pytest.approx([one.run.energy for one in samples])
         assert found.y == pytest.approx([of(one).mean() for one in samples])
@@ -372,7 +373,7 @@ def test_losses_fall_with_the_number_of_cycles(
 
 def test_the_frozen_mushroom_shows_a_section_and_a_map(figure: Callable[[str], Figure]) -> None:
     section, boundary = figure("L3").axes
-    found = orbits.follow(load("frozen-mushroom"), 60, seed=by_claim.SEED, n_orbits=6)
+    found = orbits.follow(load("frozen-mushroom"), 60, seed=figures.SEED, n_orbits=6)
     hits = np.vstack([np.column_stack(orbit.section()[2:4]) for orbit in found])
     marks = np.vstack([orbits.boundary_map(orbit) for orbit in found])
     for axes, expected in ((section, hits), (boundary, marks)):

@@ -21,8 +21,6 @@ import fast
 import reference
 import theory
 from conformance import vectors
-from conformance.audit.claim import Check
-from conformance.audit.ensemble import GivenEnsemble
 from conformance.bench import record, scoreboard
 from conformance.grading.agreement import middle
 from conformance.harness.examples import Example
@@ -30,10 +28,14 @@ from conformance.suite import Result, Run
 from conformance.suite.result import Speed
 from conformance.suite.session import Limits
 from fast.batch import careful_steps, fine_steps, lane_steps
-from mushrooms import audit_ensemble, bench, check
+from mushrooms import bench, check
+from mushrooms.audit import ensemble_command
+from mushrooms.audit.claim import Check
+from mushrooms.audit.ensemble_checks import GivenEnsemble
+from mushrooms.audit.page import pull
 from mushrooms.figures import style
 from mushrooms.reports import bench_page, check_page
-from mushrooms.reports.page import number, pull
+from mushrooms.reports.page import number
 from scene import BadInput, Horizon, State, from_data, load
 from scene.geometry import table_at
 
@@ -50,7 +52,7 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
         return b"<svg/>"
 
     monkeypatch.setattr(style, "svg", note)
-    for module in (audit_ensemble,):
+    for module in (ensemble_command,):
         monkeypatch.setattr(module, "svg", note)
     return seen
 
@@ -469,7 +471,7 @@ def test_times_of_capture_of_an_ensemble_stand_under_theory(figures):
     found = theory.at_energy(load("moving-cap"), 1e6)
     t_in = np.linspace(1.0, 3.0, 200)
     given = GivenEnsemble(load("moving-cap"), 1e6, np.zeros(201), t_in=np.append(t_in, np.nan))
-    assert audit_ensemble.capture_times(given)
+    assert ensemble_command.capture_times(given)
     [axes] = figures[0].axes
     shown, law = bars(axes, "ensemble"), bars(axes, "theory")
     assert shown.heights == pytest.approx(np.histogram(t_in, shown.edges, density=True)[0])
@@ -478,7 +480,7 @@ def test_times_of_capture_of_an_ensemble_stand_under_theory(figures):
     assert axes.get_ylim()[0] == 0
     assert law.area == pytest.approx(float(np.ptp(found.capture_cdf(np.array([1.0, 3.0])))))
     for nothing in (None, np.full(9, np.nan), np.full(9, 2.0)):
-        assert audit_ensemble.capture_times(given._replace(t_in=nothing)) is None
+        assert ensemble_command.capture_times(given._replace(t_in=nothing)) is None
 
 
 def test_our_solvers_answer_as_one_step_does():

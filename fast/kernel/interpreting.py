@@ -5,18 +5,50 @@ compile the kernels of a first question takes over ten seconds. So Python runs a
 what was compiled before is kept on disk.
 """
 
+import sys
+from types import FunctionType
 from typing import Any
 
 from numba import config
+from numba.extending import is_jitted
 
 from fast.kernel.compiling import is_at_hand
 
 MOST_STEPS = 1000  # about two seconds
+# The names of each module of kernels, as Python runs them.
+_NAMES: dict[str, dict[str, Any]] = {}
 
 
-def as_python(entry: Any) -> Any:
-    """Return a kept function as Python runs it."""
-    return entry if config.DISABLE_JIT else entry.py_func
+def _is_kernel(found: Any) -> bool:
+    return is_jitted(found) or (
+        isinstance(found, FunctionType) and found.__module__.startswith("fast.kernel.")
+    )
+
+
+def _names_of(module: str) -> dict[str, Any]:
+    if module not in _NAMES:
+        _NAMES[module] = dict(vars(sys.modules[module]))
+        for name, found in list(_NAMES[module].items()):
+            if _is_kernel(found):
+                _NAMES[module][name] = as_python(found)
+    return _NAMES[module]
+
+
+def as_python(kernel: Any) -> Any:
+    """Return a kernel as Python runs it, and with it all that it calls.
+
+    A function finds what it calls by name in its module: here it is given other names.
+    """
+    if config.DISABLE_JIT:
+        return kernel
+    function = kernel.py_func if is_jitted(kernel) else kernel
+    return FunctionType(
+        function.__code__,
+        _names_of(function.__module__),
+        function.__name__,
+        function.__defaults__,
+        function.__closure__,
+    )
 
 
 class Allowance:

@@ -19,8 +19,6 @@ from reference.arithmetic import Exhausted, Interval, Undecidable, exact_ends, i
 from reference.isolation import Isolator
 from reference.walls import MovingWalls
 from scene import Cap, Mushroom, Scene, State, Stem, Undefined, Wall
-from scene.laws import bounds
-from scene.tables import laws
 
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
 BEYOND = 2.0**-10  # how far past the end of a search f is still looked at, as a share of its length
@@ -323,7 +321,7 @@ class Course:
 
         It is twice the time to cross the largest extent the table ever has, along either axis.
         """
-        tops = {name: bounds(law) for name, law in laws(self.scene).items()}
+        tops = {name: law.bounds() for name, law in self.scene.laws.items()}
         radius = tops["r"].highest if "r" in tops else 0.0
         depth = tops["h"].highest if "h" in tops else 0.0
         tilt = max(abs(tops["slope"].lowest), abs(tops["slope"].highest)) if "slope" in tops else 0.0

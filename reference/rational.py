@@ -22,9 +22,7 @@ from typing import NamedTuple
 
 from reference.jets import Jet, multiply
 from reference.walls import wall_function
-from scene import Cap, Fourier, Law, Scene, State, Wall
-from scene.laws import Quadratic, is_constant, piece_at
-from scene.tables import laws, width_factors
+from scene import Cap, Law, Scene, State, Wall
 
 MAX_ORDER = 4096  # of the roots of unity whose sum may be found to be 0
 
@@ -121,20 +119,21 @@ def _is_zero_sum(factors: dict[Fraction, Fraction]) -> bool:
 
 def law_jet(law: Law, time: Fraction) -> Jet:
     """Return a law and its derivatives just after `time`."""
-    piece = piece_at(law, time)
-    if isinstance(piece, Quadratic):
-        u = time - piece.origin
-        return _rational_jet(piece.c0 + u * u * piece.c2, 2 * u * piece.c2, 2 * piece.c2)
-    if not isinstance(piece, Fourier):
-        return _rational_jet(Fraction(piece))
-    if piece.omega is None:
-        assert piece.period is not None
-        is_part, angle = True, time / Fraction(piece.period)
-        frequency = _collected([(Wave(power=1), 2 / Fraction(piece.period))])
+    piece = law.piece_at(time)
+    if piece.is_polynomial:
+        f, d1, half_d2, *_ = [*piece.polynomial(time), *[Fraction(0)] * 3]
+        return _rational_jet(f, d1, 2 * half_d2)
+    omega, length = piece.cycle
+    is_part = length is not None
+    if length is not None:
+        angle = time / length
+        frequency = _collected([(Wave(power=1), 2 / length)])
     else:
-        is_part, frequency, angle = False, exact(piece.omega), Fraction(piece.omega) * time
+        assert omega is not None
+        angle = Fraction(omega) * time
+        frequency = exact(omega)
     totals = [exact(piece.mean), exact(0), exact(0)]
-    for k, a, b in piece.harmonics():
+    for k, a, b in piece.harmonics:
         factor = exact(1)
         for order in range(3):
             # A derivative turns each cosine by a quarter; sin x is cos(x - quarter).
@@ -156,9 +155,8 @@ def wall_jet(scene: Scene, state: State, wall: Wall, s: Fraction) -> Jet:
 
     def law(name: str) -> Jet:
         if name != "w":
-            return law_jet(laws(scene)[name], time)
-        assert not isinstance(scene, Cap)
-        return reduce(multiply, (law_jet(factor, time) for factor in width_factors(scene)))
+            return law_jet(scene.laws[name], time)
+        return reduce(multiply, (law_jet(factor, time) for factor in scene.width.factors))
 
     return wall_function(scene, wall, x, y, law, lambda p: multiply(p, p))
 
@@ -177,8 +175,8 @@ def straight_time(scene: Scene, state: State, wall: Wall) -> Fraction | None:
     """
     if isinstance(scene, Cap) or wall == state.wall:
         return None
-    moving = (scene.h,) if wall == "floor" else (*width_factors(scene), scene.slope)
-    if not all(map(is_constant, moving)):
+    moving = (scene.laws["h"],) if wall == "floor" else (scene.width, scene.laws["slope"])
+    if not all(law.is_constant for law in moving):
         return None
     jet = wall_jet(scene, state, wall, Fraction(0))
     f, rate = jet.f.fraction(), jet.d1.fraction()

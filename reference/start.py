@@ -9,9 +9,7 @@ from reference.course import SIDES, Course
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import Cap, InvalidState, Mushroom, Scene, State, Stem, Undefined, Wall
 from scene.geometry import placed
-from scene.laws import is_constant
 from scene.states import ON_WALL
-from scene.tables import laws
 
 
 def depart(arithmetic: Arithmetic, scene: Scene, state: State, t_end: Fraction | None) -> Course | Undefined:
@@ -146,7 +144,7 @@ def _judge_rise(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> 
         raise Undecidable("f'' at the start has no sign")
     if bend > 0:
         return True
-    is_at_rest = all(is_constant(law) for law in laws(scene).values())
+    is_at_rest = scene.cycle is None
     return Undefined("sliding" if bend < 0 or is_at_rest or wall == "base" else "tangency")
 
 

@@ -18,8 +18,6 @@ from reference.isolation import Isolator
 from reference.jets import Jet, multiply
 from reference.timeline import Legs, Waves
 from reference.walls import MovingWalls
-from scene.laws import bounds, leg_at
-from scene.tables import laws
 
 Fault = Callable[[pytest.MonkeyPatch], None]
 
@@ -40,7 +38,7 @@ def replacing(owner: object, name: str) -> Callable[[Callable[..., Any]], Fault]
 @replacing(Legs, "jet")
 def knots_unseen(honest, self, s):
     """The piece that holds where an interval begins is taken to hold on all of it."""
-    return self._on(leg_at(self.law, self.instant + exact_ends(s)[0]), s)
+    return self._on(self.law.leg_at(self.instant + exact_ends(s)[0]), s)
 
 
 @replacing(Legs, "__init__")
@@ -71,7 +69,7 @@ def residual_forgotten(monkeypatch):
 @replacing(start, "_distance_of")
 def size_of_all_time(honest, scene, wall, motion):
     """A state is on the wall it names by the largest size of all time."""
-    return motion.arithmetic.number(max(bounds(law).highest for law in laws(scene).values()))
+    return motion.arithmetic.number(max(law.bounds().highest for law in scene.laws.values()))
 
 
 @replacing(start, "_walls_near")

@@ -53,7 +53,7 @@ from scene import (
     transforms,
 )
 from scene.geometry import table_at
-from scene.laws import bounds, is_constant
+from scene.laws import bounds, is_constant, times_power
 from scene.precision import decimals
 from scene.refusal import shown
 from scene.states import Stepper

@@ -19,6 +19,7 @@ from reference.arithmetic import Exhausted, Interval, Undecidable, exact_ends, i
 from reference.isolation import Isolator
 from reference.walls import MovingWalls
 from scene import Cap, Mushroom, Scene, State, Stem, Undefined, Wall
+from scene.mpmath_internals import ends
 
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
 BEYOND = 2.0**-10  # how far past the end of a search f is still looked at, as a share of its length
@@ -302,7 +303,7 @@ class Course:
         turn, motion = self.motion.timeline.turn, self.motion.at_rest(s)
         if turn is None:
             return False
-        place = wall, motion.flight.x._mpi_, motion.flight.y._mpi_
+        place = wall, ends(motion.flight.x), ends(motion.flight.y)
         if place not in self._never_met:
             arithmetic, start = self.arithmetic, self.arithmetic.zero
             jet, before = partial(motion.wall, wall), arithmetic.number(-1)

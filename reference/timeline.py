@@ -25,6 +25,7 @@ from typing import Any
 from reference.arithmetic import Arithmetic, Interval, exact_ends, is_below, sign
 from reference.jets import Jet, united
 from scene import BangBang, Fourier, Law, Scene
+from scene.mpmath_internals import ends
 from scene.pieces import PolynomialPiece
 
 ORDER = 8
@@ -51,7 +52,7 @@ class Timeline:
 
     def jet(self, name: str, s: Interval) -> Jet:
         """Enclose a law and its derivatives at every time within s."""
-        key = name, s._mpi_
+        key = name, ends(s)
         if key in self._known:
             self._arithmetic.spend(1)
         else:

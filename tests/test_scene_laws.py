@@ -15,7 +15,7 @@ from support.depth import deep_but
 from support.refusals import one_line
 
 from conformance.strategies import laws
-from scene import BangBang, Cap, Constant, Fourier, Law, Stem, bounds
+from scene import BangBang, Cap, Constant, Fourier, Law, Stem, bounds, mpmath_internals as raw
 from scene.bounds import LEAST_NORMAL, Bounds, round_up
 from scene.exact import Sturm, add, at, multiply, negative_point, root_bound, scale, vanishes
 from scene.laws import law_of
@@ -220,7 +220,7 @@ FINE.prec = IV.prec = 400  # bits
 
 def truth(law: Law) -> list[tuple[mpf, mpf]]:
     """Enclose the numbers that `bounds` bounds."""
-    return [tuple(FINE.make_mpf(end) for end in interval._mpi_) for interval in enclosures(law)]
+    return [tuple(FINE.make_mpf(end) for end in raw.ends(interval)) for interval in enclosures(law)]
 
 
 def enclosures(law: Law) -> Bounds:

@@ -21,8 +21,9 @@ from math import lcm
 from typing import NamedTuple
 
 from reference.jets import Jet, multiply
+from reference.prepared import Prepared
 from reference.walls import wall_function
-from scene import Cap, Law, Scene, State, Wall
+from scene import Law, State, Wall
 
 MAX_ORDER = 4096  # of the roots of unity whose sum may be found to be 0
 
@@ -147,7 +148,7 @@ def _rational_jet(f: Fraction, d1: Fraction = Fraction(0), d2: Fraction = Fracti
     return Jet(exact(f), exact(d1), exact(d2))
 
 
-def wall_jet(scene: Scene, state: State, wall: Wall, s: Fraction) -> Jet:
+def wall_jet(table: Prepared, state: State, wall: Wall, s: Fraction) -> Jet:
     """Return f, f', f'' of a wall at flight time s, exactly."""
     time, vx, vy = Fraction(state.t) + s, Fraction(state.vx), Fraction(state.vy)
     x = _rational_jet(Fraction(state.x) + vx * s, vx)
@@ -155,10 +156,10 @@ def wall_jet(scene: Scene, state: State, wall: Wall, s: Fraction) -> Jet:
 
     def law(name: str) -> Jet:
         if name != "w":
-            return law_jet(scene.laws[name], time)
-        return reduce(multiply, (law_jet(factor, time) for factor in scene.width.factors))
+            return law_jet(table.laws[name], time)
+        return reduce(multiply, (law_jet(table.laws[factor], time) for factor in table.width))
 
-    return wall_function(scene, wall, x, y, law, lambda p: multiply(p, p))
+    return wall_function(table, wall, x, y, law, lambda p: multiply(p, p))
 
 
 def crossing_time(state: State) -> Fraction | None:
@@ -168,24 +169,24 @@ def crossing_time(state: State) -> Fraction | None:
     return -Fraction(state.y) / Fraction(state.vy)
 
 
-def straight_time(scene: Scene, state: State, wall: Wall) -> Fraction | None:
+def straight_time(table: Prepared, state: State, wall: Wall) -> Fraction | None:
     """Return the exact flight time to a straight wall of the stem at rest, when it lies ahead.
 
     A wall that is being left and stands still is not met: None.
     """
-    if isinstance(scene, Cap) or wall == state.wall:
+    if table.is_cap or wall == state.wall:
         return None
-    moving = (scene.laws["h"],) if wall == "floor" else (scene.width, scene.laws["slope"])
-    if not all(law.is_constant for law in moving):
+    moving = ("h",) if wall == "floor" else (*table.width, "slope")
+    if not all(table.laws[name].is_constant for name in moving):
         return None
-    jet = wall_jet(scene, state, wall, Fraction(0))
+    jet = wall_jet(table, state, wall, Fraction(0))
     f, rate = jet.f.fraction(), jet.d1.fraction()
     return -f / rate if f is not None and rate is not None and f > 0 > rate else None
 
 
-def is_zero(scene: Scene, state: State, wall: Wall, s: Fraction) -> bool:
+def is_zero(table: Prepared, state: State, wall: Wall, s: Fraction) -> bool:
     """Tell whether f, less its residual f(0) on the wall being left, is known to vanish exactly at s."""
-    f: ExactNumber = wall_jet(scene, state, wall, s).f
+    f: ExactNumber = wall_jet(table, state, wall, s).f
     if wall == state.wall:
-        f += -wall_jet(scene, state, wall, Fraction(0)).f
+        f += -wall_jet(table, state, wall, Fraction(0)).f
     return f.is_zero()

@@ -24,7 +24,8 @@ from typing import Any
 
 from reference.arithmetic import Arithmetic, Interval, exact_ends, is_below, sign
 from reference.jets import Jet, united
-from scene import BangBang, Fourier, Law, Scene
+from reference.prepared import Prepared
+from scene import BangBang, Fourier, Law
 from scene.mpmath_internals import ends
 from scene.pieces import PolynomialPiece
 
@@ -38,13 +39,13 @@ class Timeline:
 
     Args:
         arithmetic: working precision.
-        scene: table and laws.
+        table: the scene, prepared.
         instant: the absolute time from which times are counted [time].
     """
 
-    def __init__(self, arithmetic: Arithmetic, scene: Scene, instant: Fraction) -> None:
-        self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in scene.laws.items()}
-        length = None if scene.cycle is None else scene.cycle.value(arithmetic.context)
+    def __init__(self, arithmetic: Arithmetic, table: Prepared, instant: Fraction) -> None:
+        self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in table.laws.items()}
+        length = None if table.cycle is None else table.cycle.value(arithmetic.context)
         self.turn = None if length is None else arithmetic.upper(length)  # a period at least
         self._arithmetic = arithmetic
         # Particles at rest at several places ask for the same parts of a period.

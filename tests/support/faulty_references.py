@@ -49,9 +49,9 @@ def period_from_zero(honest, self, arithmetic, law, instant):
 
 
 @replacing(rational, "is_zero")
-def tie_with_the_residual(_, scene, state, wall, s):
+def tie_with_the_residual(_, table, state, wall, s):
     """Ties are judged by f, not by f - f(0)."""
-    return rational.wall_jet(scene, state, wall, s).f.is_zero()
+    return rational.wall_jet(table, state, wall, s).f.is_zero()
 
 
 @replacing(Isolator, "value")
@@ -68,15 +68,15 @@ def residual_forgotten(monkeypatch):
 
 
 @replacing(start, "_distance_of")
-def size_of_all_time(honest, scene, wall, motion):
+def size_of_all_time(honest, table, wall, motion):
     """A state is on the wall it names by the largest size of all time."""
-    return motion.arithmetic.number(max(law.bounds().highest for law in scene.laws.values()))
+    return motion.arithmetic.number(max(law.bounds().highest for law in table.laws.values()))
 
 
 @replacing(start, "_walls_near")
-def corner_unseen(honest, scene, state):
+def corner_unseen(honest, table, state):
     """A state that names a wall is on no other."""
-    return [] if state.wall else honest(scene, state)
+    return [] if state.wall else honest(table, state)
 
 
 def hit_at_end_counts(monkeypatch):

@@ -115,7 +115,8 @@ def _refuse(error: BaseException) -> int:
 
     if isinstance(error, BadInput):
         return _tell(REFUSED, str(error))
-    if variables := _variables_behind(error):
+    variables = _variables_behind(error)
+    if variables:
         return _tell(REFUSED, f"environment variable {' or '.join(variables)}: {error}")
     raise error
 
@@ -123,7 +124,8 @@ def _refuse(error: BaseException) -> int:
 def _variables_behind(error: BaseException) -> list[str]:
     """Return the variables that configure a library, with their values, if it fails while it is imported."""
     being_imported = set[str]()
-    library, at = "", error.__traceback__
+    library = ""
+    at = error.__traceback__
     while at is not None:
         library = str(at.tb_frame.f_globals.get("__name__")).partition(".")[0]
         if at.tb_frame.f_code.co_name == "<module>":

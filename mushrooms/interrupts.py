@@ -18,7 +18,8 @@ import sys
 import time
 from types import FrameType
 
-PROGRAM, INTERRUPTED = "mushrooms", 130
+PROGRAM = "mushrooms"
+INTERRUPTED = 130
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 AGAIN = 0.05  # seconds after which an interrupt that was thrown away is raised again
 SAME = 0.5  # seconds in which further signals are the same Ctrl-C: a wrapper has it too, and passes it on
@@ -63,7 +64,8 @@ class Listener:
 
     def __init__(self, *, is_program: bool) -> None:
         self.has_heard = False
-        self._is_program, self._first = is_program, 0.0
+        self._is_program = is_program
+        self._first = 0.0
         self._code: int | None = None  # in which the command has ended
         self._before: dict[int, object] = {}
         self._can_repeat = False
@@ -113,7 +115,8 @@ class Listener:
         if self.has_heard and self._is_program:
             say_interrupted()
             os._exit(INTERRUPTED)
-        self.has_heard, self._first = True, now
+        self.has_heard = True
+        self._first = now
         raise Interrupt(self)
 
     def _repeat(self, _number: int, _frame: FrameType | None) -> None:

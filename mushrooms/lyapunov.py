@@ -59,7 +59,8 @@ def jacobians(orbit: FollowedOrbit, progress: Callable[[int], None] | None = Non
 
     out = np.empty((len(orbit.walls), 5, 5))
     for k, wall in enumerate(orbit.walls):
-        before, after = orbit.state(k), orbit.state(k + 1).t
+        before = orbit.state(k)
+        after = orbit.state(k + 1).t
         end = after + (after - before.t) + math.ulp(after)  # a horizon safely beyond the known hit
         proved = reference.next_collision(orbit.scene, before, end, digits=DIGITS, is_differentiated=True)
         if isinstance(proved, Undecided):
@@ -92,11 +93,13 @@ def stretching(orbit: FollowedOrbit, progress: Callable[[int], None] | None = No
     units = np.column_stack([length / speeds, *[np.full(n + 1, length)] * 2, speeds, speeds])
     # At first without symmetry: equal parts sideways and in direction.
     vx, vy = states[0, 3:]
-    deviation, logs = np.array([0.0, -vy, vx, -vy, vx]) / (math.hypot(vx, vy) * math.sqrt(2.0)), np.empty(n)
+    deviation = np.array([0.0, -vy, vx, -vy, vx]) / (math.hypot(vx, vy) * math.sqrt(2.0))
+    logs = np.empty(n)
     for k, matrix in enumerate(jacobians(orbit, progress)):
         deviation = matrix @ (deviation * units[k]) / units[k + 1]
         size = float(np.linalg.norm(deviation))
-        logs[k], deviation = math.log(size), deviation / size
+        logs[k] = math.log(size)
+        deviation = deviation / size
     exponents = np.cumsum(logs) / np.arange(1, n + 1)
     blocks = logs[n % N_BLOCKS :].reshape(N_BLOCKS, -1).mean(axis=1)
     error = float(blocks.std(ddof=1) / math.sqrt(N_BLOCKS))

@@ -156,7 +156,8 @@ class FollowedOrbit:
             raise BadInput(f"phase = {phase}, must be at least 0 and below 1")
         if not self.scene.period:
             raise BadInput(f"phase = {phase}: the walls of this scene stand still")
-        begin, end = self.start.t, float(self.states()[-1, 0])
+        begin = self.start.t
+        end = float(self.states()[-1, 0])
         first = start_time(self.scene) + phase * self.scene.period
         lowest, highest = ((t - first) / self.scene.period for t in (begin, end))
         count = np.arange(math.ceil(lowest), math.floor(highest) + 1, dtype=np.float64)

@@ -43,7 +43,8 @@ def print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str
 
 
 def _rounded(name: str, pairs: dict[str, Any]) -> str:
-    value, error = pairs[name], pairs.get(f"{name.removesuffix('_se').removesuffix('_theory')}_se")
+    value = pairs[name]
+    error = pairs.get(f"{name.removesuffix('_se').removesuffix('_theory')}_se")
     if value is None:
         return "–"
     if not (isinstance(value, float) and isinstance(error, float) and 0 < error < math.inf):

@@ -10,7 +10,8 @@ from typing import Any
 from rich import progress
 from rich.console import Console
 
-FIRST, EVERY = 20.0, 60.0  # seconds to the first line, and between lines, where there is no terminal
+FIRST = 20.0  # seconds to the first line, where there is no terminal
+EVERY = 60.0  # seconds between lines
 CLOCK = time.monotonic
 UNITS = ((1.0, "seconds"), (60.0, "minutes"), (3600.0, "hours"), (86400.0, "days"))
 # The kernels of `fast.kernel` that take more than three seconds to compile, and how long a command waits in
@@ -77,15 +78,21 @@ class Watch:
     """
 
     def __init__(self, bar: progress.Progress, name: str, unit: str) -> None:
-        self._bar, self._name, self._unit = bar, name, unit
+        self._bar = bar
+        self._name = name
+        self._unit = unit
         self._task = bar.add_task(name, total=None)
-        self._begin, self._n_before, self._next = math.nan, 0, math.inf
+        self._begin = math.nan
+        self._n_before = 0
+        self._next = math.inf
 
     def update(self, n_done: int, n_total: int) -> None:
         """Take note of how many are done; the clock begins with the first call, when all is compiled."""
         now = CLOCK()
         if math.isnan(self._begin):
-            self._begin, self._n_before, self._next = now, n_done, now + FIRST
+            self._begin = now
+            self._n_before = n_done
+            self._next = now + FIRST
         self._bar.update(self._task, completed=n_done, total=n_total)
         if self._bar.disable and now >= self._next:
             self._next = now + EVERY

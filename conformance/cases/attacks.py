@@ -121,7 +121,8 @@ def judged(attack: Question, steppers: UnderAttack) -> Iterable[Judgement]:
     if is_proved or found.kind == "wrong":
         yield found
     if step is not None:
-        is_alone, alone = attack.collisions is None, attack._replace(collisions=None, is_flow=False)
+        is_alone = attack.collisions is None
+        alone = attack._replace(collisions=None, is_flow=False)
         claim = (found if is_alone else _survived(partial(confirmed, alone))).claim
         yield _survived(lambda: stepped(step(*asked), claim, attack.state))
     if flow is not None and attack.is_flow:
@@ -138,7 +139,9 @@ def _survived(judge_answer: Callable[[], Judgement]) -> Judgement:
 
 def confirmed(attack: Question) -> Judgement:
     """Ask the reference, and have the verifier judge its claim; of an undecided path as far as that goes."""
-    state, t_end, n_collisions = attack.state, attack.t_end, attack.collisions
+    state = attack.state
+    t_end = attack.t_end
+    n_collisions = attack.collisions
     scene = from_data(attack.wire_scene())
     begun = time.process_time()
     if n_collisions is None:
@@ -146,7 +149,8 @@ def confirmed(attack: Question) -> Judgement:
     else:
         claim = claimed_path(scene, state, n_collisions, t_end, attack.working)
     seconds = (time.process_time() - begun) / max(len(claim.steps), 1)
-    is_undecided, n_steps = claim.outcome == "undecided", len(claim.steps) + (claim.outcome == "undefined")
+    is_undecided = claim.outcome == "undecided"
+    n_steps = len(claim.steps) + (claim.outcome == "undefined")
     if is_undecided and not claim.steps:
         return Judgement("undecided", claim.reason, seconds=seconds)
     written = Expectation("collision", claim.steps) if is_undecided else claim

@@ -103,7 +103,8 @@ def measured_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS
 
 def _steepest(derivative: reference.Enclosure, largest: float) -> float:
     """Return a derivative rounded; at a knot, where it is enclosed between two, the greater in size."""
-    low, high = float(derivative.lo), float(derivative.hi)
+    low = float(derivative.lo)
+    high = float(derivative.hi)
     if high - low <= 2.0**-40 * largest:
         return float(derivative)
     return max(low, high, key=abs)
@@ -118,7 +119,8 @@ def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> St
         signs: of the moves of t, x, y, vx, vy.
         nudge: relative; to the greater component for place and velocity.
     """
-    place, speed = max(abs(state.x), abs(state.y)), max(abs(state.vx), abs(state.vy))
+    place = max(abs(state.x), abs(state.y))
+    speed = max(abs(state.vx), abs(state.vy))
     sizes = (abs(state.t), place, place, speed, speed)
     numbers = astuple(state)[:5]
     t, x, y, vx, vy = (v + nudge * sign * size for v, sign, size in zip(numbers, signs, sizes, strict=True))
@@ -188,7 +190,8 @@ class Links:
     """
 
     def __init__(self, state: State, *, is_timed: bool = True) -> None:
-        self.state, self.is_timed = state, is_timed
+        self.state = state
+        self.is_timed = is_timed
         self.held: npt.NDArray[np.float64] = np.empty((0, 5, 5))
         self.inputs: npt.NDArray[np.float64] = np.empty((0, 5))
         self.condition = self.largest = 0.0
@@ -243,24 +246,13 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     Raises:
         Unfit: there is no answer to certify.
     """
-    assert question.collisions is not None
-    state, t_end = question.state, question.t_end
-    try:
-        path = reference.trajectory(
-            scene, state, question.collisions, t_end, working=working, is_differentiated=True
-        )
-        marks = [mark(scene, step) for step in path.steps] if question.is_flow else []
-    except InvalidState as error:
-        raise Unfit(str(error)) from None
-    end = path.outcome
-    if question.is_flow and not isinstance(end, reference.Horizon):
-        raise Unfit("no flow to the horizon")
-    links = Links(state, is_timed=not question.is_flow)
+    path, marks = _followed(scene, question, working)
+    links = Links(question.state, is_timed=not question.is_flow)
     steps = _steps(scene, links, path, question)
-    if len(steps) < len(path.steps):
-        end = None
+    end = path.outcome if len(steps) == len(path.steps) else None
     if isinstance(end, reference.Horizon):
-        numbers = coasted(end, ends(path.steps[-1].after.t) if steps else (Fraction(state.t),) * 2)
+        begin = ends(path.steps[-1].after.t) if steps else (Fraction(question.state.t),) * 2
+        numbers = coasted(end, begin)
         steps.append(certified(numbers, finite(links.coast(numbers)), None, is_wide=True))
         links.largest = max(links.largest, links.condition)
     elif end is not None and not isinstance(end, Undefined):
@@ -268,15 +260,38 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     if any(map(_is_wide, steps)):
         return proved_path(scene, question, 2 * path.digits)
     if question.is_flow:
-        arrived = arrival(steps, capture_intervals(marks))
-        largest = max(links.condition, timing_condition(arrived, state))
-        if largest > question.longest:
-            raise Unfit("the horizon is too delicate")
-        return Proved((arrived,), largest, len(steps))
-    expect = [Expectation("horizon" if end else "collision", tuple(steps))]
+        return _proved_flow(question, links, steps, marks)
+    walked = tuple(steps)
     if isinstance(end, Undefined):
-        expect = [Expectation("undefined", tuple(steps), end.reason), Expectation("undecided", tuple(steps))]
-    return Proved(tuple(expect), links.largest, len(steps) + isinstance(end, Undefined))
+        expect = (Expectation("undefined", walked, end.reason), Expectation("undecided", walked))
+        return Proved(expect, links.largest, len(steps) + 1)
+    outcome: Literal["horizon", "collision"] = "horizon" if end else "collision"
+    return Proved((Expectation(outcome, walked),), links.largest, len(steps))
+
+
+def _followed(
+    scene: Scene, question: Question, working: int | None
+) -> tuple[reference.Trajectory, list[Mark]]:
+    """Return the proved path of a question, and of a flow what each hit says of capture."""
+    assert question.collisions is not None
+    n, t_end = question.collisions, question.t_end
+    try:
+        path = reference.trajectory(scene, question.state, n, t_end, working=working, is_differentiated=True)
+        marks = [mark(scene, step) for step in path.steps] if question.is_flow else []
+    except InvalidState as error:
+        raise Unfit(str(error)) from None
+    if question.is_flow and not isinstance(path.outcome, reference.Horizon):
+        raise Unfit("no flow to the horizon")
+    return path, marks
+
+
+def _proved_flow(question: Question, links: Links, steps: list[Certified], marks: list[Mark]) -> Proved:
+    """Return a flow's answer from the whole path to its horizon, or to where `_steps` gave up."""
+    arrived = arrival(steps, capture_intervals(marks))
+    largest = max(links.condition, timing_condition(arrived, question.state))
+    if largest > question.longest:
+        raise Unfit("the horizon is too delicate")
+    return Proved((arrived,), largest, len(steps))
 
 
 def _steps(scene: Scene, links: Links, path: reference.Trajectory, question: Question) -> list[Certified]:
@@ -328,7 +343,8 @@ def claimed_path(
         path = reference.trajectory(scene, state, n_collisions, t_end, working=working)
     except InvalidState:
         return Expectation("rejected")
-    unknown, end = [0.0] * len(NUMBERS), path.outcome
+    unknown = [0.0] * len(NUMBERS)
+    end = path.outcome
     steps = [certified(collided(found), unknown, found.wall, is_wide=True) for found in path.steps]
     if isinstance(end, Undefined):
         return Expectation("undefined", tuple(steps), end.reason)
@@ -374,7 +390,8 @@ def capture_intervals(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
         if mark in ("captured", "free"):
             interval = interval.after(place, mark == "captured")
         elif mark == "out":
-            if span := interval.until(place):
+            span = interval.until(place)
+            if span:
                 spans.append((int(span[0]), int(span[1])))
             interval = CaptureInterval()
     return tuple(spans)
@@ -389,7 +406,8 @@ def arrival(steps: Sequence[Certified], spans: Sequence[tuple[int, int]]) -> Exp
     kept = sorted({place for span in spans for place in span} | {len(steps) - 1})
     thinned = []
     for before, place in zip([-1, *kept], kept, strict=False):
-        flown, last = steps[before + 1 : place + 1], steps[place]
+        flown = steps[before + 1 : place + 1]
+        last = steps[place]
         low, high = (sum(sides) for sides in zip(*(step.ends("dt") for step in flown), strict=True))
         numbers = {name: last.ends(name) for name in NUMBERS} | {"dt": (low, high)}
         allowance = [sum(step.allowance[0] for step in flown), *last.allowance[1:]]
@@ -400,16 +418,20 @@ def arrival(steps: Sequence[Certified], spans: Sequence[tuple[int, int]]) -> Exp
 
 def timing_condition(expected: Expectation, state: State) -> float:
     """Return the condition number of the times at which a flow's stays begin and end, the largest."""
-    t, allowance, worst = state.t, abs(state.t), 0.0
+    t = state.t
+    allowance = abs(state.t)
+    worst = 0.0
     for step in expected.steps[:-1]:
-        t, allowance = t + float(step.centre("dt")), allowance + step.allowance[0]
+        t = t + float(step.centre("dt"))
+        allowance = allowance + step.allowance[0]
         worst = max(worst, allowance / abs(t) if t else inf)
     return worst
 
 
 def _is_captured(scene: Mushroom, step: reference.Collision) -> bool:
     """Tell whether |x vy - y vx| > w |v|; the left side is the same all along the flight."""
-    arithmetic, departure = Arithmetic(step.digits), step.departure
+    arithmetic = Arithmetic(step.digits)
+    departure = step.departure
 
     def interval(enclosure: reference.Enclosure) -> Interval:
         return arithmetic.hull(*(arithmetic.point(end._mpf_) for end in enclosure))

@@ -106,7 +106,8 @@ def agrees(made: Vector, line: Vector) -> bool:
     for one, other in zip(_steps(made), _steps(line), strict=True):
         slack = _slack(other)
         for name, a, b in zip(NUMBERS, one.allowance, other.allowance, strict=True):
-            (low, high), (least, most) = one.ends(name), other.ends(name)
+            low, high = one.ends(name)
+            least, most = other.ends(name)
             if low > most or least > high or not isclose(a, b, rel_tol=1e-2, abs_tol=slack[name]):
                 return False
     return True
@@ -116,7 +117,8 @@ def _slack(step: Certified) -> dict[str, float]:
     """Return what an allowance may differ by if it vanishes: a part of its time, place or velocity."""
     sizes = dict(zip(NUMBERS, step.allowance, strict=True))
     sizes = {name: max(size, *(abs(float(end)) for end in step.ends(name))) for name, size in sizes.items()}
-    place, velocity = max(sizes["x"], sizes["y"]), max(sizes["vx"], sizes["vy"])
+    place = max(sizes["x"], sizes["y"])
+    velocity = max(sizes["vx"], sizes["vy"])
     found = {"dt": sizes["dt"], "x": place, "y": place, "vx": velocity, "vy": velocity}
     return {name: ROUNDING * size for name, size in found.items()}
 
@@ -165,7 +167,8 @@ def _asked(data: dict[str, Any]) -> Question:
 def write(folder: Path, vectors: Iterable[Vector]) -> Manifest:
     """Write vectors, by file, and their manifest, each complete or not at all; the manifest last."""
     folder.mkdir(parents=True, exist_ok=True)
-    files, entries = defaultdict[str, list[Vector]](list), {}
+    files = defaultdict[str, list[Vector]](list)
+    entries = {}
     for vector in vectors:
         name = "hard-cases" if vector.group.startswith("hard-case-") else vector.group
         files[f"{name}.jsonl"].append(vector)

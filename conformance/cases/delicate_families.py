@@ -49,8 +49,12 @@ def dyadic(draw: Draw, at: float) -> tuple[Scene, list[tuple[float, float]]]:
 
     A length moves by at most a quarter of itself: h slope <= 0.08 < 0.18 <= w <= 0.47 < 0.75 <= r.
     """
-    w, h, slope = draw.pick((0.25, 0.375)), draw.pick((0.5, 1.0)), draw.pick((0.0, 0.0625, -0.25))
-    top, feet, table = [(1.0, 0.0)], [(w, 0.0), (w - slope * h, -h)], draw.pick(TABLES)
+    w = draw.pick((0.25, 0.375))
+    h = draw.pick((0.5, 1.0))
+    slope = draw.pick((0.0, 0.0625, -0.25))
+    top = [(1.0, 0.0)]
+    feet = [(w, 0.0), (w - slope * h, -h)]
+    table = draw.pick(TABLES)
     if table == "cap":
         return Cap(r=moved(draw, 1.0, at)), top
     width, depth = moved(draw, w, at), moved(draw, h, at)
@@ -75,14 +79,16 @@ def corner_start(draw: Draw) -> Question:
 
 def corner_arrival(draw: Draw) -> Question:
     """Fly to a corner or to the mouth's edge: exactly, or missed by 2^-26 to 2^-50."""
-    dt, (of, corners) = draw.pick(ARRIVALS), dyadic(draw, 0.0)
-    (x, y), side = draw.pick(corners), draw.pick((1.0, -1.0))
+    dt = draw.pick(ARRIVALS)
+    of, corners = dyadic(draw, 0.0)
+    x, y = draw.pick(corners)
+    side = draw.pick((1.0, -1.0))
     is_below = isinstance(of, Stem) or y < 0
-    x0, y0 = (
-        draw.pick((0.0, 0.0625, -0.125)),
-        -draw.pick((0.125, 0.25)) if is_below else draw.pick((0.125, 0.25)),
-    )
-    vx, vy, t = (side * x - x0) / dt, (y - y0) / dt, PERIOD * draw.pick((0, 0, 1, -3, 100)) - dt
+    x0 = draw.pick((0.0, 0.0625, -0.125))
+    y0 = -draw.pick((0.125, 0.25)) if is_below else draw.pick((0.125, 0.25))
+    vx = (side * x - x0) / dt
+    vy = (y - y0) / dt
+    t = PERIOD * draw.pick((0, 0, 1, -3, 100)) - dt
     miss = draw.pick((0.0, draw.power(-50, -26), -draw.power(-50, -26)))
     return Question(
         of,
@@ -96,15 +102,21 @@ def hit_at_end(draw: Draw) -> Question:
 
     Sometimes the wall rests at a knot then, behind which is a violent leg.
     """
-    dt, size, side = draw.pick(ARRIVALS), draw.pick((1.0, 1.5)), draw.pick((1.0, -1.0))
-    knot, quick, t_end = at_or_next_to(draw, dt), draw.power(-40, -1), at_or_next_to(draw, dt)
+    dt = draw.pick(ARRIVALS)
+    size = draw.pick((1.0, 1.5))
+    side = draw.pick((1.0, -1.0))
+    knot = at_or_next_to(draw, dt)
+    quick = draw.power(-40, -1)
+    t_end = at_or_next_to(draw, dt)
     law = moved(draw, size, dt)
     if draw.pick((False, True)):
-        other, times = draw.between(0.3, 4.0), (0.0, knot, knot + quick, knot + quick + 1.0, PERIOD)
+        other = draw.between(0.3, 4.0)
+        times = (0.0, knot, knot + quick, knot + quick + 1.0, PERIOD)
         law = BangBang(knots=tuple(zip(times, (size, size, other, other, size), strict=True)))
         t_end = draw.pick((t_end, 3.9))
     room = size * draw.pick((0.25, 0.5, 0.75))
-    speed, turns = room / dt, PERIOD * draw.pick((0, 0, 1, 1024, -2))
+    speed = room / dt
+    turns = PERIOD * draw.pick((0, 0, 1, 1024, -2))
     asked: tuple[tuple[Scene, State], ...] = (
         (Cap(r=law), State(turns, 0.0, size - room, 0.0, speed)),
         (Stem(w=1.0, h=law), State(turns, 0.25, room - size, 0.0, -speed)),
@@ -129,17 +141,22 @@ def knot_at_event(draw: Draw) -> Question:
     )
     start, _ = state(draw, of, {"t": 0.0, "site": draw.pick(("cap", "stem")), "speed": 0.25})
     before: list[Any] = [start, *plain.trajectory(of, start, 3, NEVER)]
-    n, known = draw.pick((1, 1, 2, 3)), laws(of)
+    n = draw.pick((1, 1, 2, 3))
+    known = laws(of)
     if not all(isinstance(hit, State | Collision) for hit in before) or len(before) <= n:
         raise Unfit("no such hit")
     last, hit = before[n - 1 : n + 1]
-    name, time = {"arc": "r", "floor": "h", "base": "w"}.get(hit.wall, draw.pick(("w", "slope"))), hit.t
+    name = {"arc": "r", "floor": "h", "base": "w"}.get(hit.wall, draw.pick(("w", "slope")))
+    time = hit.t
     if hit.wall != "base" and last.y * hit.y < 0 and draw.pick((True, False)):
-        name, time = "w", last.t - last.y / last.vy
+        name = "w"
+        time = last.t - last.y / last.vy
     width = draw.power(-52, -30) * draw.between(1.0, 2.0)
-    begin, size = time + width * draw.pick((-2.0, -1.0, -0.5, -0.1, 0.0, 0.1, 1.0)), float(getattr(of, name))
+    begin = time + width * draw.pick((-2.0, -1.0, -0.5, -0.1, 0.0, 0.1, 1.0))
+    size = float(getattr(of, name))
     end = max(begin + width, math.nextafter(begin, math.inf))
-    other, times = draw.pick((0.25, 0.5, 2.0)) * size, (0.0, begin, end, end + draw.between(0.05, 2.0), 64.0)
+    other = draw.pick((0.25, 0.5, 2.0)) * size
+    times = (0.0, begin, end, end + draw.between(0.05, 2.0), 64.0)
     leg = BangBang(knots=tuple(zip(times, (size, size, other, other, size), strict=True)))
     turns = draw.pick((0.0, 64.0, -64.0, draw.power(12, 110)))
     late = State(turns, start.x, start.y, start.vx, start.vy, start.wall)
@@ -150,7 +167,8 @@ def knot_at_event(draw: Draw) -> Question:
 
 def across_a_knot(draw: Draw) -> Question:
     """Leave a wall just before a knot, late, and meet it again just after another."""
-    period, which = draw.pick((0.5, 1.0, 3.0)), draw.pick(("r", "h", "w"))
+    period = draw.pick((0.5, 1.0, 3.0))
+    which = draw.pick(("r", "h", "w"))
     law = many_legs(draw, 0.6, 2.0, period, draw.pick((3, 4, 5)))
     (t0, _), (t1, _) = law.knots[0:2]
     t = period * draw.pick((0, 0, 1, 100, 1000)) + t1 - (t1 - t0) * 10.0 ** -draw.between(0.5, 6.0)
@@ -174,18 +192,23 @@ def tiny_slope(draw: Draw) -> Question:
 
     Its lean may vanish, and come back, on the way.
     """
-    t, speed = draw.pick((0.25, 0.5, 0.125, 0.75)), draw.pick((1.0, 0.5, 0.25, 0.0))
+    t = draw.pick((0.25, 0.5, 0.125, 0.75))
+    speed = draw.pick((1.0, 0.5, 0.25, 0.0))
     width, half = rise_and_fall(*draw.pick(((1.0, 2.0), (0.5, 0.75), (1.0, 1.125))), t)
-    lean, wall, back = draw.pick((1.0, -1.0)) * draw.power(-400, -40), draw.pick(SIDES), 2 - t
+    lean = draw.pick((1.0, -1.0)) * draw.power(-400, -40)
+    wall = draw.pick(SIDES)
+    back = 2 - t
     first, last = draw.pick(((lean, 0.0), (0.0, lean), (lean, -lean)))
     vanishing = BangBang(knots=((0.0, first), (draw.pick((back, 1.0)), last), (2.0, first)))
     slopes: tuple[Law, ...] = lean, vanishing
-    slope, y = draw.pick(slopes), -speed * (2 - 2 * t) if speed and draw.pick((True, False)) else -1.5
+    slope = draw.pick(slopes)
+    y = -speed * (2 - 2 * t) if speed and draw.pick((True, False)) else -1.5
     tables: tuple[Scene, ...] = (
         Stem(w=width, h=4.0, slope=slope),
         Mushroom(r=4.0, w=width, h=4.0, slope=slope),
     )
-    turn, x = 2.0 * draw.pick((0, 0, 1, -5, 512)), half if wall == "right" else -half
+    turn = 2.0 * draw.pick((0, 0, 1, -5, 512))
+    x = half if wall == "right" else -half
     leaving = State(turn + t, x, y, 0.0, speed, wall)
     return Question(draw.pick(tables), leaving, turn + draw.pick((3.0, at_or_next_to(draw, back))))
 
@@ -211,7 +234,8 @@ def extreme_scale(draw: Draw) -> Question:
     """Ask a plain question with lengths and times scaled by powers of two up to 2^+-390, together."""
     of = scene(draw, draw.pick(TABLES), clock(draw))
     start, t_end = state(draw, of, {})
-    length, units = draw.pick(range(-LARGEST, LARGEST + 1)), draw.pick(range(-LARGEST, LARGEST + 1))
+    length = draw.pick(range(-LARGEST, LARGEST + 1))
+    units = draw.pick(range(-LARGEST, LARGEST + 1))
     units = min(max(units, length - 380), length + 380)  # speeds beyond 2^400 are refused by every stepper
     return Question(scaled(of, length, units), scaled_state(start, length, units), 2.0**units * t_end)
 
@@ -231,8 +255,10 @@ def slow_towards_waves(draw: Draw) -> Question:
     """Come within thousands of periods to a wall of several harmonics, never all at their least together."""
     sin, cos = (tuple(draw.between(-0.05, 0.05) for _ in range(n)) for n in (3, 2))
     law = Fourier(mean=1.0, period=draw.pick((1.0, 0.375)), sin=(0.1, *sin), cos=cos)
-    v, across = 10.0 ** -draw.between(2.0, 5.0), draw.pick((0.0, 0.125, -0.5))
-    t, inside = draw.between(-9.0, 9.0), draw.between(0.25, 0.6)
+    v = 10.0 ** -draw.between(2.0, 5.0)
+    across = draw.pick((0.0, 0.125, -0.5))
+    t = draw.between(-9.0, 9.0)
+    inside = draw.between(0.25, 0.6)
     options: tuple[tuple[Scene, State], ...] = (
         (Stem(w=1.0, h=law), State(t, 0.0, -inside, across * v / 4, -v)),
         (Stem(w=law, h=1.0), State(t, draw.pick((1.0, -1.0)) * inside, -0.5, v, across * v / 4)),
@@ -263,7 +289,8 @@ def nearly_shut(draw: Draw) -> Question:
     law, t = _next_to_nothing(draw)
     part = draw.pick((1.0, -1.0)) * 10.0 ** -draw.between(4.0, 11.0)
     size = float(value(FINE, law, FINE.mpf(t)) * (1 + FINE.mpf(part)))
-    x, made = size * draw.pick((1.0, -1.0)), Mushroom(r=1.5, w=law, h=1.0)
+    x = size * draw.pick((1.0, -1.0))
+    made = Mushroom(r=1.5, w=law, h=1.0)
     before = draw.power(-40, -20)  # and so much later, or as exactly as times are, at the mouth
     asked: tuple[tuple[Scene, State], ...] = (
         (Stem(w=1.0, h=law), State(t, 0.25, -size, 0.0, 1.0)),
@@ -277,7 +304,8 @@ def nearly_shut(draw: Draw) -> Question:
 def all_but_gone(draw: Draw) -> Question:
     """Fly to an arc, a floor or a side that is about to be, or has just been, next to nothing."""
     law, t = _next_to_nothing(draw)
-    speed, across = draw.power(-3, 7), draw.between(-1.0, 1.0)
+    speed = draw.power(-3, 7)
+    across = draw.between(-1.0, 1.0)
     asked: tuple[tuple[Scene, State], ...] = (
         (Cap(r=law), State(t, 0.0, 0.0, across * speed, speed, "base")),
         (Stem(w=1.0, h=law), State(t, 0.25, 0.0, across / 10 * speed, -speed, "base")),

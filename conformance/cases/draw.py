@@ -53,7 +53,8 @@ class Draw:
 
     def short(self, low: float, high: float) -> float:
         """Draw a number of at most four decimals from [low, high], if it holds one."""
-        least, most = math.ceil(low * 10_000), math.floor(high * 10_000)
+        least = math.ceil(low * 10_000)
+        most = math.floor(high * 10_000)
         if most < least:
             return self.between(low, high)
         return (least + self.bits(30) % (most - least + 1)) / 10_000
@@ -69,7 +70,8 @@ class Draw:
     def direction(self) -> tuple[float, float]:
         """Draw a unit vector: a rational point of the circle, in any octant."""
         p = self.part()
-        c, s = (1 - p * p) / (1 + p * p), 2 * p / (1 + p * p)
+        c = (1 - p * p) / (1 + p * p)
+        s = 2 * p / (1 + p * p)
         if self.pick((False, True)):
             c, s = s, c
         return c * self.pick((1.0, -1.0)), s * self.pick((1.0, -1.0))
@@ -175,7 +177,8 @@ class Family(NamedTuple):
             BadInput: they have none.
         """
         for attempt in range(ATTEMPTS):
-            if question := self.attempt(Draw(f"{self.name}/{key}/{attempt}")):
+            question = self.attempt(Draw(f"{self.name}/{key}/{attempt}"))
+            if question:
                 return question
         raise BadInput(f"{self.name}/{key}: none of {ATTEMPTS} draws is a question")
 
@@ -185,7 +188,8 @@ class Family(NamedTuple):
             asked = self.ask(draw)
         except (BadInput, Unfit):
             return None
-        rule, source = asked.rule or self.aim, asked.source or self.source
+        rule = asked.rule or self.aim
+        source = asked.source or self.source
         return asked._replace(group=self.name, rule=rule, source=source)
 
 

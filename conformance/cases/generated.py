@@ -84,7 +84,9 @@ def _is_wanted(question: Question, family: Family) -> bool:
 
 def _asked(draw: Draw, kind: Kind, asked: Question) -> Question | None:
     """Return a question of a kind, filed; None where fewer hits follow than it is to have."""
-    of, start, t_end = asked.scene, asked.state, asked.t_end
+    of = asked.scene
+    start = asked.state
+    t_end = asked.t_end
     assert not isinstance(of, dict)
     data: dict[str, Any] = wire_form(of) | ({"name": of.name} if of.name else {})
     longest = min(asked.longest, CONDITIONS[_delicacy(of, start)])
@@ -97,7 +99,8 @@ def _asked(draw: Draw, kind: Kind, asked: Question) -> Question | None:
     hits = plain.trajectory(of, start, n_hits + 1, t_end)
     if not all(isinstance(hit, Collision) for hit in hits[:n_hits]):
         return None
-    before, after = hits[n_hits - 1], hits[-1]
+    before = hits[n_hits - 1]
+    after = hits[-1]
     if kind == "trajectory":
         return question._replace(collisions=n_hits)
     if len(hits) <= n_hits or not isinstance(before, Collision) or not isinstance(after, Collision | Horizon):

@@ -19,7 +19,9 @@ CAP: Data = {"table": "cap", "r": 1.0}
 STEM: Data = {"table": "stem", "w": 1.0, "h": 1.25}
 MUSHROOM: Data = {"table": "mushroom", "r": 1.0, "w": 0.5, "h": 1.0}
 INSIDE = {"cap": (0.125, 0.25), "stem": (0.125, -0.25), "mushroom": (0.125, 0.25)}
-BRIEF, LONG = 2.0**-12, 4.0  # times in which a particle at INSIDE, with speed 1, meets no wall, and meets one
+# Times in which a particle at INSIDE, with speed 1, meets no wall, and meets one.
+BRIEF = 2.0**-12
+LONG = 4.0
 FURTHER: tuple[tuple[str, Any], ...] = (
     ("hint", 7.0),
     ("T", None),
@@ -157,7 +159,8 @@ def _near(draw: Draw, bound: float, far: float, is_kept: bool) -> float | Data:
     past = draw.power(-40, -2) * (far - bound) * (1.0 if is_kept else -1.0)
     if draw.pick((False, True)):
         return bound + past
-    mean, size = (far + bound + past) / 2, (far - bound - past) / 2
+    mean = (far + bound + past) / 2
+    size = (far - bound - past) / 2
     return wave(draw, mean=mean, cos=[size * draw.pick((1.0, -1.0))], sin=[])
 
 

@@ -106,7 +106,8 @@ def _leaving(draw: Draw, off: float, lift: float, name: bool = True, walls: tupl
     nx, ny = at.normal(wall, x, y)
     by = off * _size(at, wall, x)
     x, y = (x + by, y) if wall == "left" else (x - by, y) if wall == "right" else (x + by * nx, y + by * ny)
-    away, along = lift - at.receding(wall, y), draw.pick((1.0, -1.0))
+    away = lift - at.receding(wall, y)
+    along = draw.pick((1.0, -1.0))
     state = State(t, x, y, away * nx - along * ny, away * ny + along * nx, wall if name else None)
     return ask(
         draw, wire_form(of), {field: getattr(state, field) for field in State.__struct_fields__}, 2.0**-20
@@ -137,10 +138,12 @@ def on_its_wall(draw: Draw, is_kept: bool) -> RuleCase:
 @rule
 def before_its_end(draw: Draw, is_kept: bool) -> RuleCase:
     """Start on the arc above y = 0 or below, or on a side below y = 0 or above."""
-    past, side = draw.power(-10, -4), draw.pick((1.0, -1.0))
+    past = draw.power(-10, -4)
+    side = draw.pick((1.0, -1.0))
     turn = past if is_kept else -past
     if draw.pick((False, True)):
-        x, y = side * math.cos(turn), math.sin(turn)
+        x = side * math.cos(turn)
+        y = math.sin(turn)
         state = {"t": 0.0, "x": x, "y": y, "vx": -side, "vy": 0.125, "wall": "arc"}
     else:
         wall = "right" if side > 0 else "left"
@@ -167,7 +170,8 @@ CORNERS: tuple[tuple[Data, float, float, tuple[Wall | None, ...]], ...] = (
 def _corner(draw: Draw) -> Data:
     scene, x, y, walls = draw.pick(CORNERS)
     vx, vy = draw.direction()
-    wall, side = draw.pick(walls), draw.pick((1.0, -1.0))
+    wall = draw.pick(walls)
+    side = draw.pick((1.0, -1.0))
     wall = "left" if wall == "right" and side < 0 else wall
     return ask(draw, scene, {"t": 0.0, "x": side * x, "y": y, "vx": vx, "vy": vy, "wall": wall})
 
@@ -209,7 +213,8 @@ def early(draw: Draw, is_kept: bool) -> RuleCase:
     """Start one ulp before or at 2^30 periods, or up to 2^10 times as far, on either side of time 0."""
     laws = (1.0, wave(draw), legs([[0.0, 1.0], [0.5, 1.25], [1.5, 1.0]]))
     scene = {**CAP, "r": draw.pick(laws)}
-    shared = period(of := from_data(scene))
+    of = from_data(scene)
+    shared = period(of)
     bound = LATE * (1.0 if shared is None else float(shared.length or 2 * math.pi / (shared.omega or 1.0)))
     while is_late(of, bound):
         bound = math.nextafter(bound, 0.0)
@@ -253,7 +258,8 @@ def known_command(draw: Draw, is_kept: bool) -> RuleCase:
 @rule
 def whole_request(draw: Draw, is_kept: bool) -> RuleCase:
     """Give all fields, or leave one out."""
-    request, gone = ask(draw, any_table(draw)), draw.pick(("scene", "state", "t_end"))
+    request = ask(draw, any_table(draw))
+    gone = draw.pick(("scene", "state", "t_end"))
     return one_of(
         request if is_kept else {name: part for name, part in request.items() if name != gone}, is_kept
     )
@@ -291,7 +297,8 @@ def finite(draw: Draw, is_kept: bool) -> RuleCase:
 @rule
 def sequence(draw: Draw, is_kept: bool) -> RuleCase:
     """Number a request by a whole number within bounds, or not."""
-    good, bad = (0, 1, MAX_SEQ), (-1, 2.5, "1", None, True, MAX_SEQ + 2)
+    good = (0, 1, MAX_SEQ)
+    bad = (-1, 2.5, "1", None, True, MAX_SEQ + 2)
     return one_of({**ask(draw, any_table(draw)), "seq": draw.pick(good if is_kept else bad)}, is_kept)
 
 

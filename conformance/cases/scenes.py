@@ -89,7 +89,8 @@ def law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
     n_cos, n_sin = draw.pick(MANY_HARMONICS if shared.kind == "harmonics" else FEW_HARMONICS)
     size = 0.999 * min(high - mean, mean - low) / (n_cos + n_sin)
     amplitudes = [draw.short(-size, size) for _ in range(n_cos + n_sin)]
-    cos, sin = tuple(amplitudes[:n_cos]), tuple(amplitudes[n_cos:])
+    cos = tuple(amplitudes[:n_cos])
+    sin = tuple(amplitudes[n_cos:])
     if shared.kind == "harmonics":
         return Fourier(mean=mean, period=shared.rate, cos=cos, sin=sin)
     return Fourier(mean=mean, omega=shared.rate, cos=cos, sin=sin)
@@ -149,7 +150,8 @@ def any_law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
     A constant may be written as a law that moves by nothing, with a period that no other has; a wave may sink
     nearly to 0; a law may hardly move; one of legs begins anywhere, and may have as many as there may be.
     """
-    found, way = law(draw, low, high, shared), draw.pick((0, 1, 2, 3, 4))
+    found = law(draw, low, high, shared)
+    way = draw.pick((0, 1, 2, 3, 4))
     if isinstance(found, float) and way == 4:
         return Fourier(mean=found, omega=draw.short(0.5, 6.0), cos=(0.0,))
     if isinstance(found, float):
@@ -175,7 +177,8 @@ def _faint(of: Fourier | BangBang, part: float) -> Fourier | BangBang:
 
 def many_legs(draw: Draw, low: float, high: float, period: float, n: int | None = None) -> BangBang:
     """Draw a law of n legs, or of many."""
-    n, places = n or draw.pick(LEGS), set[int]()
+    n = n or draw.pick(LEGS)
+    places = set[int]()
     while len(places) < n - 1:
         places.add(draw.pick(range(1, GRID)))
     times = [0.0, *(period * place / GRID for place in sorted(places)), period]
@@ -194,7 +197,8 @@ def any_scene(draw: Draw, table: str | None = None, kinds: Sequence[str] = KINDS
     found = scene(draw, table or draw.pick((*TABLES, "mushroom")), clock(draw, kinds), any_law)
     if not isinstance(found, Cap):
         mouth = "w" if "w" in laws(found) else "nu"
-        deeper, wider = draw.pick(DEEPER), draw.pick(NARROWER)
+        deeper = draw.pick(DEEPER)
+        wider = draw.pick(NARROWER)
         powers = {mouth: wider, "h": deeper, "slope": wider - deeper}
         found = replace(found, **{name: scaled_law(getattr(found, name), n, 0) for name, n in powers.items()})
     return replace(found, name=draw.pick(("", "", "scene", "1")))
@@ -260,7 +264,8 @@ def state(draw: Draw, scene: Scene, at: dict[str, Any]) -> tuple[State, float]:
         lift = at.get("lift") or draw.part()
         along = draw.pick((1.0, -1.0)) * speed
         away = lift * speed - table.receding(wall, y)
-        vx, vy = away * nx - along * ny, away * ny + along * nx
+        vx = away * nx - along * ny
+        vy = away * ny + along * nx
     t_end = t + at.get("patience", 64.0) * table.size / speed
     return State(t, x, y, vx, vy, wall), t_end
 
@@ -283,7 +288,8 @@ def start(draw: Draw, scene: Scene, t: float, site: str | None = None) -> tuple[
         t: time of the start [time].
         site: a region or a wall; any by default.
     """
-    length, table = scene.period or 1.0, rounded(scene, t)
+    length = scene.period or 1.0
+    table = rounded(scene, t)
     site = site or draw.pick(sites(scene))
     x, y = point(table, site, draw.near_an_end(), draw.near_an_end())
     usual = draw.pick((walls_speed(scene) or table.size, table.size / length))
@@ -301,7 +307,8 @@ def start(draw: Draw, scene: Scene, t: float, site: str | None = None) -> tuple[
 
 def _velocity(draw: Draw, x: float, y: float, speed: float) -> tuple[float, float]:
     """Draw a velocity of some speed: any, along an axis, and to the centre, from it or around it exactly."""
-    way, distance = draw.pick(range(8)), math.sqrt(x * x + y * y)
+    way = draw.pick(range(8))
+    distance = math.sqrt(x * x + y * y)
     if way == 1 and distance > 0:
         part = 2.0 ** math.frexp(speed / distance)[1]
         return draw.pick(((-part * x, -part * y), (part * x, part * y), (-part * y, part * x)))
@@ -325,7 +332,8 @@ def _leaving(draw: Draw, table: TableAt, state: State) -> State:
 def point(at: TableAt, site: str, a: float, b: float) -> tuple[float, float]:
     """Place two parts, from 0 to 1, of a region, or one of a wall; (1/2, 1/2) is its middle."""
     if site in ("cap", "arc"):
-        p, rho = 2 * a - 1, at.r if site == "arc" else at.r * b
+        p = 2 * a - 1
+        rho = at.r if site == "arc" else at.r * b
         return rho * 2 * p / (1 + p * p), rho * (1 - p * p) / (1 + p * p)
     if site == "base" and not isinstance(at.scene, Stem):
         return math.copysign(at.w + (at.r - at.w) * b, a - 0.5), 0.0

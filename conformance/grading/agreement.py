@@ -48,14 +48,16 @@ from scene.protocol.rules import does_undecided_pass
 U = Fraction(1, 2**53)
 LEAST = Fraction(1, 2**1075)  # half the spacing of subnormal numbers: nothing rounds better
 BOUND = Fraction(1, 10**9)  # physics: far above rounding, far below any error of principle
-DIGITS, SHARPEST = Fraction(1, 1000), Fraction(1, 2**43)  # what passes is right to; a thousand backward ulps
+DIGITS = Fraction(1, 1000)  # what passes is right to
+SHARPEST = Fraction(1, 2**43)  # a thousand backward ulps
 NEAR_HIT = Fraction(1, 10)  # of the flight time
 # dt, t, place, velocity: what is judged as one vector.
 VECTORS = (("dt",), ("t",), ("x", "y"), ("vx", "vy"))
 PrecisionClass = Literal["A", "B", "C"]
 FORMS: dict[str, Any] = {"step": Answered, "trajectory": Steps, "flow": Flown}
 LOST = ("undefined", "undecided", "rejected")  # may be answered to a whole question
-SHARP, FAIR = 4.0, 1e4  # backward ulps of classes A and B
+SHARP = 4.0  # backward ulps of class A
+FAIR = 1e4  # and of class B
 # Of several right answers the best grade counts; this is the order.
 _PREFERENCE = ("pass", "indeterminate", "declined", "fail")
 Verdict = Literal["pass", "fail", "indeterminate", "declined", "error", "wrong-format"]
@@ -151,24 +153,29 @@ def compare(
     """
     answers = answer if isinstance(answer, list) else [answer]
     if expected is None:
-        is_undecided = any(isinstance(step, Undecided) for step in answers)
-        return Agreement("declined" if is_undecided else "indeterminate", why="the proof is undecided")
-    measured: list[_Error] = []
+        return _without_proof(answers)
     due = list(zip(expected.steps, _times(expected, state), strict=True))[-1 if is_end else 0 :]
+    measured: list[_Error] = []
     for i, (certified, time) in enumerate(due):
         place = f"step {i + 1}: " if isinstance(answer, list) else ""
         if i >= len(answers):
             return Agreement("fail", why=f"{place}missing, {i} of {len(due)} were given", step=i)
-        if differing := _difference(answers[i], certified):
+        differing = _difference(answers[i], certified)
+        if differing:
             return differing._replace(why=(place + differing.why)[:200], step=i)
         errors = _measure(answers[i], certified, time, place)
         measured += errors
-        if any(error.least > physics for error in errors):
-            hint = _missed(answers[i], certified)
+        if max((error.least for error in errors), default=Fraction(0)) > physics:
             judged = _judge_numbers(measured, bound, physics)
-            return judged._replace(why=judged.why + hint, step=i)
+            return judged._replace(why=judged.why + _missed(answers[i], certified), step=i)
     end = _judge_end(expected, answers[len(due) :])
     return end._replace(step=len(due)) if end else _judge_numbers(measured, bound, physics)
+
+
+def _without_proof(answers: list[Answer]) -> Agreement:
+    """Return the verdict where the proof itself is undecided."""
+    is_undecided = any(isinstance(step, Undecided) for step in answers)
+    return Agreement("declined" if is_undecided else "indeterminate", why="the proof is undecided")
 
 
 def compare_arrival(
@@ -267,7 +274,8 @@ def _judge_end(expected: Expectation, rest: Sequence[Answer]) -> Agreement | Non
         return Agreement("fail", why=f"{len(rest)} steps too many") if rest else None
     if not rest:
         return Agreement("fail", why=f"must end as {expected.outcome}")
-    kind, due = _name(rest[0]), f"{expected.outcome} {expected.reason}".rstrip()
+    kind = _name(rest[0])
+    due = f"{expected.outcome} {expected.reason}".rstrip()
     said = f"undefined {rest[0].reason}" if isinstance(rest[0], Undefined) else kind
     if said == due or kind == expected.outcome != "undefined":
         return None
@@ -307,7 +315,8 @@ def _times(expected: Expectation, state: State) -> Iterator[tuple[Ends, Fraction
     allowance = abs(low)
     for certified in expected.steps:
         shortest, longest = certified.ends("dt")
-        low, high = low + shortest, high + longest
+        low = low + shortest
+        high = high + longest
         allowance += Fraction(certified.allowance[0])
         yield (low, high), allowance
 
@@ -326,7 +335,8 @@ def _measure(answer: Answer, certified: Certified, time: tuple[Ends, Fraction], 
         names = [name for name in vector if name in answered]
         scale = max([LEAST / U, *(sizes[name] for name in names)])
         for name in names:
-            (low, high), (certified_low, certified_high) = answered[name], truth[name]
+            low, high = answered[name]
+            certified_low, certified_high = truth[name]
             most = max(abs(high - certified_low), abs(certified_high - low))
             least = max(certified_low - high, low - certified_high, Fraction(0))
             # An exact zero that nothing can move, as y on the base, has no size of its own to be measured by.
@@ -369,14 +379,8 @@ def grade(vector: Vector, answer: Any) -> Agreement:
         given = [msgspec.convert(msgspec.to_builtins(part), Answered) for part in parts]
     except (TypeError, msgspec.ValidationError, OverflowError, RecursionError) as error:
         return Agreement("wrong-format", why=" ".join(str(error).split()))
+    graded = min(_compare_all(vector, parts, given), key=lambda one: _PREFERENCE.index(one.verdict))
     physics = physics_bound(vector.condition)
-    if vector.kind == "flow":
-        captured = getattr(parts[0], "captured", None)
-        found = [compare_arrival(given[0], captured, known, vector.state, physics) for known in vector.expect]
-    else:
-        asked: Answer | list[Answer] = given if vector.kind == "trajectory" else given[0]
-        found = [compare(asked, known, vector.state, physics=physics) for known in vector.expect]
-    graded = min(found, key=lambda one: _PREFERENCE.index(one.verdict))
     if graded.verdict == "pass" and not math.isnan(graded.relative) and vector.condition * physics >= 1:
         none = f"the walls alone are graded: condition {vector.condition:.1g} allows no number"
         graded = graded._replace(why=none)
@@ -386,6 +390,18 @@ def grade(vector: Vector, answer: Any) -> Agreement:
     if any(isinstance(outcome, AnsweredCollision) and outcome.dt is None for outcome in given):
         return graded._replace(why=f"{graded.why}; without dt, t is graded in its place")
     return graded
+
+
+def _compare_all(vector: Vector, parts: list[Any], given: Sequence[Answered]) -> Iterator[Agreement]:
+    """Compare what was sent with each answer that the vector permits."""
+    physics = physics_bound(vector.condition)
+    for known in vector.expect:
+        if vector.kind == "flow":
+            captured = getattr(parts[0], "captured", None)
+            yield compare_arrival(given[0], captured, known, vector.state, physics)
+        else:
+            asked: Answer | list[Answer] = list(given) if vector.kind == "trajectory" else given[0]
+            yield compare(asked, known, vector.state, physics=physics)
 
 
 def precision_class(ulps: Sequence[float]) -> PrecisionClass:

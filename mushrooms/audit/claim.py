@@ -155,8 +155,11 @@ class ClaimEvidence:
         threads: int | None = None,
         predict: Predict = theory.predict,
     ) -> None:
-        self._samples, self.steppers = samples, steppers
-        self.size, self.seed, self.threads = size, seed, threads
+        self._samples = samples
+        self.steppers = steppers
+        self.size = size
+        self.seed = seed
+        self.threads = threads
         self._predict = predict
 
     def sample(self, run: str) -> Sample:

@@ -47,10 +47,14 @@ from scene.transforms import backwards
 from theory.finite_energy.one_cycle import TheoryError
 
 IDENTITY = "mean of E0/E1, which is 1 in the limit"
-SHARE, PEAK = "p_nc: share never captured", "log E_nc: mean of log E1/E0 of the never captured"
-FREE, CAPTURED = "log E1/E0 of the never captured", "log E1/E0 of the captured"
-TIMES, RELEASE = "times of capture", "nu at release less nu at capture"
-STARTS, OUTWARD = "share of the starts in the cap", "mean of (x^2 + y^2) / r^2 of these"
+SHARE = "p_nc: share never captured"
+PEAK = "log E_nc: mean of log E1/E0 of the never captured"
+FREE = "log E1/E0 of the never captured"
+CAPTURED = "log E1/E0 of the captured"
+TIMES = "times of capture"
+RELEASE = "nu at release less nu at capture"
+STARTS = "share of the starts in the cap"
+OUTWARD = "mean of (x^2 + y^2) / r^2 of these"
 MOST_DRAWN = 2_000_000  # gains of cycles that are drawn from theory
 MOST_SORTED = 1_000_000  # values whose whole distribution is tested; of more, evenly spaced ones
 N_TIMES = 4096  # of a cycle, at which laws are looked at
@@ -99,8 +103,11 @@ class HighEnergies:
     """The limit of high energies, by the names of `theory.FiniteEnergy`; what it leaves out is a guess."""
 
     def __init__(self, scene: Mushroom, energy: float) -> None:
-        found, self._curve = theory.predict(scene, 12), theory.energies(scene)
-        self.mean_s, self.p_nc, self.peak = float(found.m1), float(found.p_nc), (float(found.log_e_nc), 0.0)
+        found = theory.predict(scene, 12)
+        self._curve = theory.energies(scene)
+        self.mean_s = float(found.m1)
+        self.p_nc = float(found.p_nc)
+        self.peak = (float(found.log_e_nc), 0.0)
         self.cdf = self._curve.cdf
         left_out = (walls_speed(scene) / math.sqrt(2 * energy)) ** (2 / 3)
         self.theory_error = TheoryError(left_out, left_out, left_out, left_out, 0.0, 0.0)
@@ -167,7 +174,8 @@ def checks(given: GivenEnsemble, theirs: Theory) -> list[Check]:
 
 def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Theory) -> Check:
     """Hold two directions of one cycle to p_rev(-s) = p(s) exp(-s): to the share below s, at its worst."""
-    here, there = _some(given.s), -_some(other.s)
+    here = _some(given.s)
+    there = -_some(other.s)
     places = np.quantile(np.concatenate([here, there]), np.linspace(0.01, 0.99, N_LEVELS))
     pairs = [(mean(np.exp(-here) * (here <= x)), mean(there <= x)) for x in places]
     found = [(one.value - two.value, float(np.hypot(one.error, two.error))) for one, two in pairs]
@@ -183,7 +191,8 @@ def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Theory) -> Chec
 
 def _in_errors(difference: tuple[float, float]) -> float:
     """Return a difference in its standard errors; that of very few particles may have no error."""
-    size, error = abs(difference[0]), difference[1]
+    size = abs(difference[0])
+    error = difference[1]
     if error == 0:
         return math.inf if size else 0.0
     return size / error
@@ -210,7 +219,8 @@ def _starts(given: GivenEnsemble) -> Iterator[Check]:
     if given.x0 is None or given.y0 is None:
         return
     now = table_at(fp, given.scene, cycle_start(given.scene))
-    is_in_cap, cap = given.y0 > 0, float(now.cap_area())
+    is_in_cap = given.y0 > 0
+    cap = float(now.cap_area())
     yield close(STARTS, share(is_in_cap), cap / (cap + float(now.stem_area())), scale=0.3)
     if is_in_cap.sum() >= FEW:
         out = (given.x0[is_in_cap] ** 2 + given.y0[is_in_cap] ** 2) / float(now.r) ** 2
@@ -218,7 +228,8 @@ def _starts(given: GivenEnsemble) -> Iterator[Check]:
 
 
 def _energies(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
-    s, left = given.s, theirs.theory_error
+    s = given.s
+    left = theirs.theory_error
     rival = ("no growth", 0.0) if theirs.mean_s else None
     scale = max(abs(theirs.mean_s), left.mean_s) * 4
     yield close("m1: mean of log E1/E0", mean(s), theirs.mean_s, band=left.mean_s, scale=scale, against=rival)
@@ -237,7 +248,9 @@ def _energies(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
 def _captures(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     if given.captured is None:
         return
-    free, caught, left = given.s[~given.captured], given.s[given.captured], theirs.theory_error
+    free = given.s[~given.captured]
+    caught = given.s[given.captured]
+    left = theirs.theory_error
     yield close(
         SHARE,
         share(~given.captured),
@@ -271,7 +284,8 @@ def _capture_intervals(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     yield fits(TIMES, _some(t_in), theirs.capture_cdf, band=band, scale=0.4)
     if given.t_out is None:
         return
-    begin, end = _some(given.t_in), _some(given.t_out)
+    begin = _some(given.t_in)
+    end = _some(given.t_out)
     both = np.isfinite(begin) & np.isfinite(end)
     rate = N_TIMES / given.scene.period
     steepest = rate * float(np.max(np.abs(np.diff(nu_at(given.scene, np.arange(N_TIMES + 1) / rate)))))
@@ -291,7 +305,8 @@ def _later(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     n_drawn = MOST_DRAWN // n_cycles
     drawn = None if isinstance(theirs, HighEnergies) else theirs.draw(n_cycles, n_drawn, DRAWN_SEED)
     for k, total in enumerate(given.later.T, 2):
-        what, band = f"log E{k}/E0", k * theirs.theory_error.mean_s
+        what = f"log E{k}/E0"
+        band = k * theirs.theory_error.mean_s
         if drawn is None:
             yield close(f"mean of {what}", mean(total), k * theirs.mean_s, band=band)
             continue
@@ -321,11 +336,13 @@ def likely_causes(given: GivenEnsemble, theirs: Theory, found: list[Check]) -> l
     if not wrong:
         return []
     records = list(_told_by_records(given, theirs))
-    if (end := _common_end(given)) is not None:
+    end = _common_end(given)
+    if end is not None:
         return [*records, f"many captures end together at {end:.3f} of the cycle: it was followed no further"]
     told = [*records, *_told_by_captures(given, theirs, wrong)]
     s = _some(given.s, N_LOOKED_AT)
-    distance, reach = gap(s, theirs.cdf), critical_gap(len(s)) + shape_band(theirs)
+    distance = gap(s, theirs.cdf)
+    reach = critical_gap(len(s)) + shape_band(theirs)
     if distance <= reach:
         return told
     fitting = []
@@ -382,7 +399,8 @@ def _told_by_captures(given: GivenEnsemble, theirs: Theory, wrong: set[str]) -> 
         )
     elif SHARE in wrong:
         share = float(np.mean(np.isfinite(given.t_in)))
-        few, more = "few" if share < 1 - theirs.p_nc else "many", "; or starts are not uniform"
+        few = "few" if share < 1 - theirs.p_nc else "many"
+        more = "; or starts are not uniform"
         yield (
             f"too {few} are captured, {share:.1%} for {1 - theirs.p_nc:.1%}: the mouth is not as wide as its"
             f" law says, as where its corners leak{more if wrong.isdisjoint((TIMES, CAPTURED)) else ''}"
@@ -423,6 +441,8 @@ def _share_of_the_free(given: GivenEnsemble, theirs: Theory) -> float:
     if given.captured is not None:
         return float(np.mean(~given.captured))
     s = _some(given.s, N_LOOKED_AT)
-    free, captured = theirs.free_cdf(np.sort(s)), theirs.captured_cdf(np.sort(s))
-    steps, apart = (np.arange(len(s)) + 0.5) / len(s) - captured, free - captured
+    free = theirs.free_cdf(np.sort(s))
+    captured = theirs.captured_cdf(np.sort(s))
+    steps = (np.arange(len(s)) + 0.5) / len(s) - captured
+    apart = free - captured
     return float(np.clip(steps @ apart / (apart @ apart), 0.0, 1.0))

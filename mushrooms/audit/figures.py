@@ -59,7 +59,8 @@ N_PHASES = 6
 
 def loops(panels: Panels) -> None:
     """Draw the cycles: in the plane (w, h) of sec. 4.1 and the plane (V_ell/V_cap, V_cap/V) of sec. 3.5."""
-    fixed, moving = load("fixed-cap-anticlockwise"), load("moving-cap")
+    fixed = load("fixed-cap-anticlockwise")
+    moving = load("moving-cap")
     w, h = (values(laws(fixed)[name], np.linspace(0, 1, N_LOOP + 1)) for name in "wh")
     _loop(panels[0], w, h)
     panels[0].set(xlabel="half-width w", ylabel="depth h", title="fixed cap, anticlockwise")
@@ -77,7 +78,8 @@ def _loop(axes: Axes, x: FloatArray, y: FloatArray) -> None:
         i = k * N_LOOP // N_PHASES
         axes.plot(x[i], y[i], "o", color=colour, markersize=6, label=f"{k}/{N_PHASES}")
         j = i + N_LOOP // (2 * N_PHASES)
-        start, end = (x[j - 2], y[j - 2]), (x[j], y[j])
+        start = (x[j - 2], y[j - 2])
+        end = (x[j], y[j])
         if start != end:
             axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 0})
 
@@ -104,7 +106,8 @@ def retraced(panels: Panels, sample: Sample) -> None:
     left.plot(*_volume_shares(scene, np.linspace(0, scene.period, N_LOOP)), color=BLACK, linewidth=1.2)
     curve = theory.capture_curve(scene, 4 * N_PHASES + 1)
     first = curve.t_in < curve.t_out.min()  # on the way back captures and releases change places
-    t_in, t_out = curve.t_in[first], curve.t_out[first]
+    t_in = curve.t_in[first]
+    t_out = curve.t_out[first]
     for colour, label, times in ((BLUE, "captures", t_in), (ORANGE, "releases", t_out)):
         left.plot(*_volume_shares(scene, times), "o", color=colour, markersize=5, label=label)
     for pair in zip(t_in, t_out, strict=True):
@@ -175,7 +178,8 @@ def sums(panels: Panels, *samples: Sample) -> None:
 
 def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
     drawn = summed(sample.run.name, n)
-    centre, sd = drawn.mean / n, drawn.sd / n
+    centre = drawn.mean / n
+    sd = drawn.sd / n
     density, places = np.histogram(drawn.values / n, N_SUM_BINS, density=True)
     x = (places[1:] + places[:-1]) / 2
     _bars(axes, sample.s[:, n - 1] / n, np.linspace(centre - 5 * sd, centre + 5 * sd, 51), baseline=1e-9)
@@ -195,7 +199,8 @@ def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
 
 def losses(axes: Axes, sample: Sample) -> None:
     """Draw the share with less energy than at first against the number of cycles."""
-    scene, n_cycles = scene_of(sample.run), sample.run.n_cycles
+    scene = scene_of(sample.run)
+    n_cycles = sample.run.n_cycles
     found = predicted(sample).draw(n_cycles, N_DRAWN // n_cycles, DRAWN_SEED)
     axes.plot(
         np.arange(1, n_cycles + 1),
@@ -207,7 +212,8 @@ def losses(axes: Axes, sample: Sample) -> None:
     places = np.unique(np.geomspace(1, n_cycles, 12).astype(int))
     far = np.array([theory.loss_probability(scene, int(k)) for k in places])
     axes.plot(places, far, "s", color=ORANGE, markersize=4, label="theory at infinite energy")
-    rate, late = float(theory.rarity(scene).rate), places[len(places) // 2 :]
+    rate = float(theory.rarity(scene).rate)
+    late = places[len(places) // 2 :]
     slope = far[-1] * np.exp(rate * (n_cycles - late))
     axes.plot(late, slope, ":", color=ORANGE, label=f"exp(-{rate:.4f} n)")
     _points(axes, places, [share(sample.s[:, k - 1] < 0) for k in places])
@@ -222,7 +228,8 @@ def losses(axes: Axes, sample: Sample) -> None:
 
 def stems(panels: Panels, tilted: Sample, upright: Sample) -> None:
     """Draw the uncaptured particles' energies of both stems, each from its own theory's."""
-    edges, sigma = np.linspace(-0.4, 0.8, 121), width(tilted).value
+    edges = np.linspace(-0.4, 0.8, 121)
+    sigma = width(tilted).value
     outline: dict[str, Any] = {"color": BLUE, "fill": False, "linewidth": 1.5}
     for panel, scale in zip(panels, ("linear", "log"), strict=True):
         for sample, label, style in ((tilted, "tilted stem", {}), (upright, "upright stem", outline)):
@@ -261,9 +268,11 @@ def zone(panels: Panels, *samples: Sample) -> None:
 
 def widths(axes: Axes, *samples: Sample) -> None:
     """Draw the width of the uncaptured peak against E0, with fitted powers: moving caps, then c = 0."""
-    moving, ergodic = list(samples[: len(PEAKS)]), list(samples[len(PEAKS) :])
+    moving = list(samples[: len(PEAKS)])
+    ergodic = list(samples[len(PEAKS) :])
     for these, colour, marker, label in ((moving, BLUE, "o", "moving cap"), (ergodic, GREEN, "s", "c = 0")):
-        energies, values = [sample.run.energy for sample in these], [width(sample) for sample in these]
+        energies = [sample.run.energy for sample in these]
+        values = [width(sample) for sample in these]
         fit = fitted(these, values)
         text = f"{label}: exponent {fit.exponent:.4f} ± {fit.exponent_error:.4f}"
         _points(axes, energies, values, fmt=marker, color=colour, markersize=5, label=text)
@@ -279,7 +288,8 @@ def convergence(panels: Panels, *samples: Sample) -> None:
     """Draw the mean of s, p_nc and the unbiased mean against E0."""
     energies = [sample.run.energy for sample in samples]
     scene = load("moving-cap")
-    prediction, unbiased = theory.predict(scene, 15), theory.unbiased_mean(scene)
+    prediction = theory.predict(scene, 15)
+    unbiased = theory.unbiased_mean(scene)
     rows: tuple[tuple[str, list[Mean], float], ...] = (
         ("mean of ln(E1/E0)", [mean(s.gain) for s in samples], float(prediction.m1)),
         ("share never captured", [share(s.never_captured) for s in samples], float(prediction.p_nc)),
@@ -335,7 +345,9 @@ def frozen(panels: Panels) -> None:
 
 
 Samples = Mapping[str, Sample]
-MAIN_RUN, MANY_CYCLES, MANY_SLOWER = "moving-cap@1e7", "moving-cap@1e7x30", "moving-cap@1e5x30"
+MAIN_RUN = "moving-cap@1e7"
+MANY_CYCLES = "moving-cap@1e7x30"
+MANY_SLOWER = "moving-cap@1e5x30"
 PEAKS = LADDER[3:6]  # the moving caps whose widths are fitted
 
 

@@ -50,12 +50,16 @@ MEASURED = (
     "fixed-cap-other-legs",
     "fixed-cap-irregular",
 )
-PATH, STEP, LAGS = 4000.0, 8.0, 80
+PATH = 4000.0
+STEP = 8.0
+LAGS = 80
 FIRM = 30.0
 SWAY = 1e-5  # of the parameter that moves fastest [length, or none]: a relative error of this order
 TAIL = 250.0  # some five times the longest memory of a table
 SWAY_PERIOD = 200.0  # in units of TAIL, for the lag: the walls' speed is then constant to 5e-4
-N_DIFFUSING, N_LAGGING, N_WAITING = 2000, 2000, 3000
+N_DIFFUSING = 2000
+N_LAGGING = 2000
+N_WAITING = 3000
 FINER = {"moving-cap": 4.0}  # times as many particles: with fewer, diffusion was by chance 1.5 % too small
 N_GROUPS = 8  # of particles, by which errors are found
 AT_ONCE = 20_000  # turns of chords
@@ -122,7 +126,8 @@ def _spectrum(kicks: FloatArray, speed: FloatArray) -> FloatArray:
     What all lags add up to counts FIRM times as much as a lag: correlations need not be sums of exponentials,
     but fast walls see nothing else of them.
     """
-    n_steps, m = kicks.shape[1], np.array(MEMORIES)
+    n_steps = kicks.shape[1]
+    m = np.array(MEMORIES)
     seen = [
         float((kicks[:, : n_steps - k] * kicks[:, k:]).mean(axis=0).sum())
         / float((speed[: n_steps - k] * speed[k:]).sum())
@@ -202,11 +207,15 @@ def turned(
     alpha. Distances from the centre are in units of the mouth: all pass the mouth of one frozen table.
     """
     n = len(sigma)
-    half, turn = np.sqrt(1 - sigma**2), 2 * np.arccos(sigma)
+    half = np.sqrt(1 - sigma**2)
+    turn = 2 * np.arccos(sigma)
     alpha = random.uniform(0, 2 * math.pi, n)
     begin = -2 * now.r * half * random.random(n)  # path at which the chord begins
-    path, arcs, columns = np.full(n, longest), np.zeros(n), np.zeros((n, 3))
-    turning, n_turns = np.arange(n), 0
+    path = np.full(n, longest)
+    arcs = np.zeros(n)
+    columns = np.zeros((n, 3))
+    turning = np.arange(n)
+    n_turns = 0
     while len(turning):
         # The few that are left turn many times at once.
         k = n_turns + np.arange(max(1, AT_ONCE // len(turning)))
@@ -217,8 +226,10 @@ def turned(
             place = begin[turning, None] + now.r * (c * (1 + 2 * k) - s * sin / cos)
         ratio = s / (mouth[turning, None] + rate * np.maximum(place, 0.0))
         passes = (place > 0) & (np.abs(cos) > ratio)
-        is_done, first = passes.any(axis=1), passes.argmax(axis=1)
-        those, at = turning[is_done], (np.flatnonzero(is_done), first[is_done])
+        is_done = passes.any(axis=1)
+        first = passes.argmax(axis=1)
+        those = turning[is_done]
+        at = (np.flatnonzero(is_done), first[is_done])
         path[those] = np.minimum(place[at], longest)
         arcs[those] = -4 * half[those] * k[at[1]]
         columns[those] = np.column_stack([now.w * ratio[at] / cos[at], -sin[at], -np.abs(cos[at])])
@@ -252,11 +263,14 @@ def depletion(scene: Mushroom, t: float, speed: float, n: int, seed: int) -> Mea
         n: number of particles.
         seed: of their chords.
     """
-    now, chaotic = table_at(fp, scene, t), float(volumes_at(fp, scene, t).v_cha)
-    nu, x = float(now.w / now.r), np.random.default_rng([seed, 1]).random(n)
+    now = table_at(fp, scene, t)
+    chaotic = float(volumes_at(fp, scene, t).v_cha)
+    nu = float(now.w / now.r)
+    x = np.random.default_rng([seed, 1]).random(n)
     sigma = nu * (1 - x**CROWDED)
     weight = 4 * math.pi * now.r**2 * np.sqrt(1 - sigma**2) * nu * CROWDED * x ** (CROWDED - 1)
-    path, mouth = speed * scene.period, np.full(n, nu)
+    path = speed * scene.period
+    mouth = np.full(n, nu)
     moving, resting = (
         turned(now, sigma, mouth, rate, np.random.default_rng([seed, 2]), longest).path
         for rate, longest in ((widening(now) / speed, path), (0.0, LAGS * STEP))
@@ -284,7 +298,8 @@ def measured(scene: Mushroom, *, phases: FloatArray = PHASES, n: float = 1.0, se
 
 
 def _row(scene: Mushroom, t: float, n: float, random: np.random.Generator) -> list[Mean]:
-    unit, now = float(pace(scene, t)), table_at(fp, scene, t)
+    unit = float(pace(scene, t))
+    now = table_at(fp, scene, t)
     first, second = random.integers(2**63, size=2).tolist()
     n_diffusing, n_lagging, n_waiting = (int(n * size) for size in (N_DIFFUSING, N_LAGGING, N_WAITING))
     spread = diffusion(scene, t, n_diffusing, first)

@@ -45,7 +45,8 @@ SIGNS = {
     "refuted": ("✗", "bad"),
     "indeterminate": ("?", "open"),
 }
-M1, P_NC = "mean of log E1/E0", "share never captured"
+M1 = "mean of log E1/E0"
+P_NC = "share never captured"
 # Run, what is measured of it, and what the paper prints: its simulation, and its theory.
 MAIN = (
     ("fixed-cap-anticlockwise@1e9", M1, "0.0463 ± 0.0027", "0.044926"),
@@ -199,11 +200,16 @@ def headline(samples: figures.Samples) -> list[Data]:
     for run, quantity, simulated_there, theory_there in MAIN:
         if run not in samples:
             continue
-        limit, here = theory.predict(scene_of(samples[run].run)), predicted(samples[run])
+        limit = theory.predict(scene_of(samples[run].run))
+        here = predicted(samples[run])
         if quantity == M1:
-            value, expected, found = float(limit.m1), here.mean_s, mean(samples[run].gain)
+            value = float(limit.m1)
+            expected = here.mean_s
+            found = mean(samples[run].gain)
         else:
-            value, expected, found = float(limit.p_nc), here.p_nc, share(samples[run].never_captured)
+            value = float(limit.p_nc)
+            expected = here.p_nc
+            found = share(samples[run].never_captured)
         rows.append(
             {
                 "run": run,

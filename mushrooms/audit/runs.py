@@ -225,7 +225,8 @@ def draw(
     energies = ensemble.cycle_energies
     followed = (ensemble.outcome == 0) & np.all(np.isfinite(energies) & (energies > 0), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        s, phase_s = np.log(energies / ensemble.energy0), np.log(ensemble.phase_energies / ensemble.energy0)
+        s = np.log(energies / ensemble.energy0)
+        phase_s = np.log(ensemble.phase_energies / ensemble.energy0)
     return Sample(
         run=run,
         s=s[followed],

@@ -221,7 +221,8 @@ def fits(
     n = len(values)
     if n < 2:
         return Check(what, None, "a sample", n_tests=1, note="no particles")
-    (gap, p), reach = ks_1samp(values, cdf, method="exact"), critical_gap(n) + band
+    gap, p = ks_1samp(values, cdf, method="exact")
+    reach = critical_gap(n) + band
     holds = None if reach >= scale else bool(gap <= reach)
     more = f"; {note}" if note else ""
     text = f"Kolmogorov's distance, n = {n}, p = {p:.2g} without a band{more}"

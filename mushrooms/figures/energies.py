@@ -74,16 +74,23 @@ def gathered(gains: Gains, margin: float = 0.0) -> Gathered:
     """
     rows = map(_rows, gains if isinstance(gains, Iterator) else [gains])
     head = next(rows, np.zeros((0, 1)))
-    while len(head) < ENOUGH and (more := next(rows, None)) is not None:
-        head = np.concatenate([head, more])
+    is_more = True
+    while is_more and len(head) < ENOUGH:
+        more = next(rows, None)
+        is_more = more is not None
+        if more is not None:
+            head = np.concatenate([head, more])
     if len(head) < 2:
         raise BadInput(f"gains: {len(head)} particles were followed to the end, must be at least 2")
     edges = _edges(head[:, 0], margin)
-    n, counts = 0, np.zeros(len(edges) - 1, np.int64)
+    n = 0
+    counts = np.zeros(len(edges) - 1, np.int64)
     sums, squares = np.zeros((2, head.shape[1]))
     for block in chain([head], rows):
-        n, counts = n + len(block), counts + np.histogram(block[:, 0], edges)[0]
-        sums, squares = sums + block.sum(axis=0), squares + (block**2).sum(axis=0)
+        n = n + len(block)
+        counts = counts + np.histogram(block[:, 0], edges)[0]
+        sums = sums + block.sum(axis=0)
+        squares = squares + (block**2).sum(axis=0)
     mean = sums / n
     sd = np.sqrt(np.maximum(squares / n - mean**2, 0.0))
     return Gathered(n, edges, counts, mean, sd, head[:N_LINES])
@@ -125,7 +132,8 @@ def histogram(scene: Scene, energy: float, gains: Gains, n_particles: int | None
         BadInput: `scene` is not a scene, or there are fewer than two particles.
     """
     check_scene(scene)
-    found = known(scene, energy := check_energy(energy))
+    energy = check_energy(energy)
+    found = known(scene, energy)
     bars = gathered(gains, 0.0 if found is None else float(found.peak[1] ** 0.5))
     if found is None:
         figure, axes = new_figure(5.2, 4.2)
@@ -153,7 +161,8 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
         BadInput: `scene` is not a scene, or there are fewer than two particles.
     """
     check_scene(scene)
-    found = known(scene, energy := check_energy(energy))
+    energy = check_energy(energy)
+    found = known(scene, energy)
     bars = gathered(gains)
     figure, (above, below) = new_figure(6.4, 8.4, 2, 1)  # one below the other: legible on a telephone
     cycles = np.arange(len(bars.mean) + 1)
@@ -191,7 +200,8 @@ def _title(scene: Scene, energy: float, bars: Gathered, n_particles: int | None)
 
 def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
     """Draw a histogram, with the limit of high energies if theory covers the scene."""
-    highest, edges = _bars(axes, bars), bars.edges
+    highest = _bars(axes, bars)
+    edges = bars.edges
     with suppress(*NO_THEORY):
         if isinstance(scene, Mushroom) and begins_widest(scene):
             theirs = draw_adiabatic(axes, theory.energies(scene), edges, "at high energies")
@@ -246,7 +256,8 @@ def draw_never_captured(axes: Axes, place: float) -> None:
 
 def draw(axes: Axes, rest: Axes | None, bars: Gathered, found: theory.FiniteEnergy) -> None:
     """Draw a histogram, the theory over it, and residuals into `rest` if there is one."""
-    top, edges = _bars(axes, bars), bars.edges
+    top = _bars(axes, bars)
+    edges = bars.edges
     shares = np.diff(found.cdf(edges))
     if rest is None:
         axes.set(xlabel=AXIS)

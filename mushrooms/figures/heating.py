@@ -121,7 +121,8 @@ def phase_diagram(phases: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 def draw_phase_diagram(n_phases: int = 16, n_sizes: int = 6) -> Figure:
     """Draw m1 of the moving cap over the phase of the stem and the amplitude."""
-    phases, sizes = 2 * np.pi * np.arange(n_phases + 1) / n_phases, 0.6 * np.arange(1, n_sizes + 1) / n_sizes
+    phases = 2 * np.pi * np.arange(n_phases + 1) / n_phases
+    sizes = 0.6 * np.arange(1, n_sizes + 1) / n_sizes
     figure, axes = new_figure(7.0, 3.6)
     found = phase_diagram(phases, sizes)
     filled = axes.contourf(phases / np.pi, sizes, found, levels=12, cmap="viridis")

@@ -30,7 +30,8 @@ from scene.refusal import BadInput, shown
 
 N_FRAMES = 96
 TRAIL = 6  # collisions that the animation's particle draws behind it
-CAPTURED, FREE = plots.BLUE, plots.ORANGE
+CAPTURED = plots.BLUE
+FREE = plots.ORANGE
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 
 
@@ -49,7 +50,8 @@ def trajectory(orbit: FollowedOrbit) -> Figure:
     [orbit] = _check_orbits(orbit)
     figure, axes = plots.new_figure(6.4, 6.0)
     states = orbit.states()
-    begin, end = float(states[0, 0]), float(states[-1, 0])
+    begin = float(states[0, 0])
+    end = float(states[-1, 0])
     if orbit.scene.period:
         tables.draw_walls(
             axes, orbit.scene, end, color=plots.GREY, linewidth=1.2, linestyle="--", label="walls at the end"
@@ -80,7 +82,8 @@ def trajectory(orbit: FollowedOrbit) -> Figure:
 
 
 def _title(orbits: Sequence[FollowedOrbit]) -> str:
-    first, n = orbits[0], len(orbits)
+    first = orbits[0]
+    n = len(orbits)
     what = f"{len(first.walls):,} collisions" if n == 1 else f"{n} particles"
     name = plots.plain(first.scene.name or "a table")
     return f"{name}: {what} from E0 = {plots.power(first.energies()[0])}"
@@ -89,7 +92,9 @@ def _title(orbits: Sequence[FollowedOrbit]) -> str:
 def _names(axes: Axes, scene: Scene, t: float) -> None:
     """Name the walls where they are at time t, and draw the mouth."""
     table = table_at(fp, scene, t)
-    r, w, h = float(table.r), float(table.w), float(table.h)
+    r = float(table.r)
+    w = float(table.w)
+    h = float(table.h)
     style: dict[str, Any] = {"fontsize": 9, "path_effects": HALO, "ha": "center", "va": "center", "zorder": 5}
     base = "base", 0.5 * (r + w) if isinstance(scene, Mushroom) else 0.0, 0.0
     places = [base] if isinstance(scene, Stem) else [("arc", 0.0, r), base]
@@ -319,8 +324,10 @@ def write_animation(
     [orbit] = _check_orbits(orbit)
     states = orbit.states()
     times = np.linspace(states[0, 0], states[-1, 0], n_frames)
-    places, last = orbit.at(times), np.searchsorted(states[:, 0], times, side="right") - 1
-    unit, name = orbit.scene.period or 1.0, "t/T" if orbit.scene.period else "t"
+    places = orbit.at(times)
+    last = np.searchsorted(states[:, 0], times, side="right") - 1
+    unit = orbit.scene.period or 1.0
+    name = "t/T" if orbit.scene.period else "t"
     axes = tables.new_slide(orbit.scene)
     axes.plot(*places[0], "o", color=FREE, markersize=6, markerfacecolor="none", label="start")
     (trail,) = axes.plot([], [], color=plots.SKY, linewidth=1)

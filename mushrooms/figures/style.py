@@ -18,9 +18,15 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-BLUE, SKY, ORANGE, BLACK, GREY, GREEN = "#0072B2", "#A6CEE9", "#D55E00", "#1A1A1A", "#8C8C8C", "#009E73"
+BLUE = "#0072B2"
+SKY = "#A6CEE9"
+ORANGE = "#D55E00"
+BLACK = "#1A1A1A"
+GREY = "#8C8C8C"
+GREEN = "#009E73"
 NOTEBOOK_DPI = 100
-LONGEST, MOST_LINES = 40, 3  # letters of a line, and lines, of a name in a title
+LONGEST = 40  # letters of a line of a name in a title
+MOST_LINES = 3  # lines of such a name
 STYLE: dict[str, Any] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Verdana"],  # an SVG names them all with each text

@@ -25,7 +25,9 @@ N_PHASES = 6
 N_CHORDS = 14
 N_FRAMES = 36
 FRAMES_PER_SECOND = 12
-WIDEST, HIGHEST = 1920, 1080  # of an animation [pixels]: it fills a slide
+# Of an animation [pixels]: it fills a slide.
+WIDEST = 1920
+HIGHEST = 1080
 DOTS_PER_INCH = 200
 
 
@@ -57,8 +59,10 @@ def chords(scene: Scene, t: float, n: int = N_CHORDS) -> np.ndarray:
     answer.
     """
     points = np.hstack(walls(scene, t))
-    top, bottom = points[1].max(), points[1].min()
-    speed, direction = 1e6 * points[0].max(), 0.61  # radians: off every symmetry
+    top = points[1].max()
+    bottom = points[1].min()
+    speed = 1e6 * points[0].max()
+    direction = 0.61  # radians: off every symmetry
     vx, vy = float(speed * np.cos(direction)), float(speed * np.sin(direction))
     state = State(t, 0.0, float(0.37 * (top or bottom)), vx, vy)
     path = [np.array([state.x, state.y])]
@@ -102,7 +106,8 @@ def write_picture(scene: Scene, suffix: str, file: BinaryIO, progress: Progress 
         file: open for binary writing.
         progress: see `write_frames`.
     """
-    times, name = phases(scene, N_FRAMES), plots.plain(scene.name)
+    times = phases(scene, N_FRAMES)
+    name = plots.plain(scene.name)
     if suffix != ".gif":
         figure = new_strip(scene, 7.2, 6.0)
         figure.suptitle(name)
@@ -168,7 +173,8 @@ def write_frames(
 def _frame(scene: Scene) -> tuple[float, float, float, float]:
     # Left, right, bottom, top of one frame that holds the walls of the whole cycle.
     points = np.hstack([line for t in phases(scene, N_FRAMES) for line in walls(scene, t)])
-    (left, bottom), (right, top) = points.min(axis=1), points.max(axis=1)
+    left, bottom = points.min(axis=1)
+    right, top = points.max(axis=1)
     margin = 0.05 * max(right - left, top - bottom)
     return left - margin, right + margin, bottom - margin, top + margin
 

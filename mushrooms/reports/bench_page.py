@@ -141,7 +141,8 @@ NAMED = {
 }
 PLACES = {"time-stepping": ((-14, 0), "right"), "proof": ((6, 14), "right")}  # of their names, by family
 LABEL = 9  # size of text [points]
-MOST_DIGITS, LEAST_DIGITS = 300.0, 0.5
+MOST_DIGITS = 300.0
+LEAST_DIGITS = 0.5
 LEAST_NS = 10.0
 BINARY64 = 53 * math.log10(2)
 TICKS = (1, 2, 4, 8, 16, 32, 64, 128)
@@ -189,7 +190,8 @@ def headline(record: Record) -> Figure:
 
 
 def _mark(axes: Any, p: Point) -> None:
-    colour, (first, ns, third) = COLOURS[p.family], quartiles(p.ns)
+    colour = COLOURS[p.family]
+    first, ns, third = quartiles(p.ns)
     middle, worst = _digits_of(p)
     if p.right:
         axes.plot([middle, middle], [first, third], color=colour, marker="_", markersize=6, linewidth=1.2)

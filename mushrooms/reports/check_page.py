@@ -24,7 +24,9 @@ from mushrooms.reports.page import embed, render
 from scene import BadInput, Collision, Horizon, Outcome, Scene, State, from_data
 from scene.geometry import table_at
 
-N_FAILED, N_SHARPEST = 8, 4  # cases drawn: those that failed, or else the least precise that passed
+# Cases drawn: those that failed, or else the least precise that passed.
+N_FAILED = 8
+N_SHARPEST = 4
 MAX_LISTED = 200
 EXACT = 1e-2  # ulps at which answers with no error at all are drawn
 
@@ -71,7 +73,8 @@ def _case(result: Result, vector: vectors.Vector) -> dict[str, Any]:
 
 def _rows(result: Result) -> list[tuple[str, str, str]]:
     """Return the fields of a failure: name, certified, given; its reason stands in the caption."""
-    certified, given = result.expected or {}, result.given or {}
+    certified = result.expected or {}
+    given = result.given or {}
     names = [
         name
         for name in dict.fromkeys([*certified, *given])
@@ -103,7 +106,8 @@ def _speed(run: Run) -> bytes:
     """Draw the implementation's point: time per collision against the error of its answers."""
     assert run.speed is not None
     ulps = np.maximum([u for u in run.ulps() if math.isfinite(u)], EXACT)
-    middle, worst = float(np.median(ulps)), float(ulps.max())
+    middle = float(np.median(ulps))
+    worst = float(ulps.max())
     figure, axes = plots.new_figure(4.8, 3.2)
     axes.plot([run.speed.best_ns] * 2, [middle, worst], color=plots.BLUE, linewidth=1.5)
     axes.plot(run.speed.best_ns, worst, marker="v", color=plots.BLUE, linestyle="none", label="worst")

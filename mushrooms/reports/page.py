@@ -72,5 +72,6 @@ def typeset(text: str) -> Markup:
 def _symbol(match: re.Match[str]) -> str:
     if match["greek"]:
         return f"<i>{GREEK[match['greek']]}</i>"
-    base, index = GREEK.get(match["base"], match["base"]), match["index"] or match["digit"]
+    base = GREEK.get(match["base"], match["base"])
+    index = match["index"] or match["digit"]
     return f"<i>{base}</i><sub>{index}</sub>"

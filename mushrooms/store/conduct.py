@@ -135,7 +135,8 @@ def _hand_out(
     """Keep every worker busy, and yield what comes back; what is still out is dropped at the end."""
     from distributed import KilledWorker, wait
 
-    out, n_killed = dict[Any, BlockRange](), Counter[int]()
+    out = dict[Any, BlockRange]()
+    n_killed = Counter[int]()
 
     def submit(block_range: BlockRange) -> None:
         asked_for = (mushrooms.__version__, spec, block_range, threads)
@@ -162,19 +163,23 @@ def _hand_out(
                 except KilledWorker:
                     # So many workers died with it that the scheduler gave it up; it may not be its fault.
                     n_killed[block_range.number] += 1
-                    if n_killed[block_range.number] > RETRIES:
-                        raise ConnectionError(
-                            f"--dask: workers die of block {block_range.number} again and again"
-                        ) from None
+                    _check_killed(block_range, n_killed[block_range.number])
                     submit(block_range)
-                    continue
-                yield block_range, block
+                else:
+                    yield block_range, block
     finally:
         client.cancel(list(out))
 
 
+def _check_killed(block_range: BlockRange, n_killed: int) -> None:
+    """Give a block up that workers have died of too often."""
+    if n_killed > RETRIES:
+        raise ConnectionError(f"--dask: workers die of block {block_range.number} again and again") from None
+
+
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
-LEAST_BLOCK, MOST_BLOCK = 256, 2**17  # particles: a thread's lanes are full, and memory stays small
+LEAST_BLOCK = 256  # particles: a thread's lanes are full
+MOST_BLOCK = 2**17  # memory stays small
 ROOM = 2**12  # particles of a new run's block, however few it has: it may be widened
 BLOCK_BYTES = 2**26  # on disk; in memory several times that
 LANES_OF_A_THREAD = 128  # particles that a thread needs to be quick
@@ -267,7 +272,8 @@ def read_description(folder: Path, spec: RunSpec, more: dict[str, object]) -> di
     Raises:
         BadInput: it is another: in what, and both values; or its description is damaged.
     """
-    found, wanted = attributes_of(folder), spec.to_data() | more
+    found = attributes_of(folder)
+    wanted = spec.to_data() | more
     other = difference(found, {name: value for name, value in wanted.items() if name != "cycles"})
     if other is not None:
         raise BadInput(f"output {str(folder)!r} holds another run: {other}")
@@ -307,7 +313,8 @@ def complete(
         LimitReached: a limit; what was kept stays.
         OSError: a block could not be written; the one followed meanwhile is dropped.
     """
-    begin, n = CLOCK(), run.shape.n_particles if n_particles is None else n_particles
+    begin = CLOCK()
+    n = run.shape.n_particles if n_particles is None else n_particles
     there = n - sum(block_range.n for block_range in run.lacking() if block_range.first < n)
 
     def report(n_done: int) -> None:
@@ -343,7 +350,8 @@ def _probe(run: StoredRun) -> None:
         return
     stored = run.block(there, PROBED)
     n, n_cycles = stored.ensemble.cycle_energies.shape
-    block_range, spec = BlockRange(there, there * run.shape.block, n), run.spec
+    block_range = BlockRange(there, there * run.shape.block, n)
+    spec = run.spec
     _compare(run, stored, follow(spec._replace(n_cycles=n_cycles), block_range, None))
     if n_cycles < spec.n_cycles:
         longer = follow(spec, block_range._replace(before=stored), None)
@@ -351,10 +359,12 @@ def _probe(run: StoredRun) -> None:
 
 
 def _compare(run: StoredRun, one: fast.Paused, other: fast.Paused) -> None:
-    ones, others = columns(one), columns(other)
+    ones = columns(one)
+    others = columns(other)
     for name in run.shape.names:
         if not np.array_equal(ones[name], others[name], equal_nan=ones[name].dtype.kind == "f"):
-            made, here = attributes_of(run.folder), made_by()
+            made = attributes_of(run.folder)
+            here = made_by()
             by = next((key for key in here if made.get(key) != here[key]), "versions")
             raise BadInput(
                 f"output {str(run.folder)!r}: {name} of its first particles comes out otherwise here, where"

@@ -19,7 +19,7 @@ import numpy as np
 from mushrooms.folders import check_file
 from mushrooms.progress import Watch, progress_bar
 from mushrooms.store.run import GROUP, StoredRun, attributes_of, open_run
-from mushrooms.store.spec import FIELDS, LANES, WALLS, Arrays
+from mushrooms.store.spec import FIELDS, LANES, WALLS, Array, Arrays
 from scene import BadInput
 from scene.files.tables import write_table
 from scene.files.writer import write_file
@@ -116,9 +116,14 @@ def _tables(run: StoredRun, watch: Watch) -> Iterator[Arrays]:
         watch.update(first, run.shape.n_particles)
         table: Arrays = {"particle": np.arange(first, first + run.shape.rows(number))}
         for name in names:
-            array = run.read(number, name)
-            for place in product(*map(range, array.shape[1:])):
-                words = [WALLS[i] if FIELDS[name].dims[-1] == "wall" else str(i + 1) for i in place]
-                at: Any = (slice(None), *place)
-                table["_".join([name, *words])] = array[at]
+            table |= _columns(name, run.read(number, name))
         yield table
+
+
+def _columns(name: str, array: Array) -> Iterator[tuple[str, Array]]:
+    """Yield an array's columns, one for each place beside that of the particle, by their names."""
+    is_by_wall = FIELDS[name].dims[-1] == "wall"
+    for place in product(*map(range, array.shape[1:])):
+        words = [WALLS[i] if is_by_wall else str(i + 1) for i in place]
+        at: Any = (slice(None), *place)
+        yield "_".join([name, *words]), array[at]

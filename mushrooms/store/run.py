@@ -39,7 +39,8 @@ from mushrooms.store.summary import RunTally, tally_of
 from scene import BadInput
 from scene.files.writer import sealed, unsealed, write_file
 
-GROUP, MARKERS = "ensemble.zarr", "blocks"
+GROUP = "ensemble.zarr"
+MARKERS = "blocks"
 DESCRIPTION = "run.marker"  # among the markers: the group's attributes once more, sealed
 # What zarr raises of damaged metadata and chunks.
 UNREADABLE = (ArithmeticError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
@@ -97,8 +98,12 @@ class StoredRun:
     """
 
     def __init__(self, folder: Path, spec: RunSpec, shape: Shape, command: str) -> None:
-        self.folder, self.spec, self.shape, self.command = folder, spec, shape, command
-        self.tally, self.seconds = RunTally(), 0.0
+        self.folder = folder
+        self.spec = spec
+        self.shape = shape
+        self.command = command
+        self.tally = RunTally()
+        self.seconds = 0.0
         self._markers: dict[int, Marker] = {}  # of the blocks on disk, those outgrown included
         self._arrays: dict[str, Any] = {}  # of the Zarr group, once it is open
         # The marker of another run, moved here with its files, does not count.
@@ -220,7 +225,8 @@ class StoredRun:
         Raises:
             BadInput: it is missing or damaged.
         """
-        marker, begin = self._markers.get(number), number * self.shape.block
+        marker = self._markers.get(number)
+        begin = number * self.shape.block
         if marker is not None and self._is_open():
             with suppress(*UNREADABLE):
                 array = np.asarray(self._arrays[name][begin : begin + marker.rows])
@@ -243,7 +249,8 @@ class StoredRun:
                 marker = self._marker(number)
                 self._count(marker, RunTally(particles=marker.rows))
         if any(self.lacking()):
-            there, n = self.tally.particles, self.shape.n_particles
+            there = self.tally.particles
+            n = self.shape.n_particles
             raise BadInput(
                 f"run {str(self.folder)!r} has {there} of {n} particles: go on with {self.command}"
             )

@@ -133,7 +133,9 @@ class Stored(NamedTuple):
     meaning: str
 
 
-ONE, CYCLES, SLOTS = ("particle",), ("particle", "cycle"), ("particle", "cycle", "narrowing")
+ONE = ("particle",)
+CYCLES = ("particle", "cycle")
+SLOTS = ("particle", "cycle", "narrowing")
 LOOKS = ("particle", "cycle", "phase")
 FIELDS = {
     "cycle_energies": Stored(CYCLES, "float64", "energy v^2/2 at the end of each cycle"),

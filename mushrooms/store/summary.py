@@ -73,7 +73,8 @@ def gain_of(gains: Callable[[], Iterable[npt.NDArray[np.float64]]]) -> Gain:
             lengths.append(len(part))
             yield from (part[:, -1] - centre).tolist()
 
-    total, n = math.fsum(values(0.0)), sum(lengths)
+    total = math.fsum(values(0.0))
+    n = sum(lengths)
     if not n or not math.isfinite(total):
         return Gain(n)
     mean = total / n
@@ -99,7 +100,9 @@ def _collisions_of_a_cycle(scene: Scene, energy: float) -> float:
     Particles uniform in place and direction meet the walls, of length P around an area A, at the rate
     v P / (pi A), however they move; in a cycle v^2 goes as 1 / A.
     """
-    begin, span, n_times = start_time(scene), one_cycle(scene), 64
+    begin = start_time(scene)
+    span = one_cycle(scene)
+    n_times = 64
     area, _ = _size(scene, begin)
     sizes = [_size(scene, begin + span * ((k + 0.5) / n_times)) for k in range(n_times)]
     rates = [math.sqrt(2.0 * energy * area / a) * walls / (math.pi * a) for a, walls in sizes]
@@ -210,8 +213,10 @@ def explain_limit(spec: RunSpec, summary: Mapping[str, Any]) -> str | None:
 
 def _explain_narrow_start(scene: Mushroom) -> str:
     """Say why a cycle that begins with a narrow mouth has no theory, and how to shift it."""
-    begin, length = start_time(scene), scene.period
-    now, widest = table_at(fp, scene, begin), theory.Cycle.of(scene, DIGITS)
+    begin = start_time(scene)
+    length = scene.period
+    now = table_at(fp, scene, begin)
+    widest = theory.Cycle.of(scene, DIGITS)
     wait = (float(widest.start) - begin) % length
     return (
         f"m1_theory, p_nc_theory: none, for the cycle begins at t = {begin:.6g} with its mouth at"
@@ -275,11 +280,14 @@ def predicted(spec: RunSpec) -> Theory | None:
         limit = theory.predict(spec.scene, DIGITS)
     except NO_THEORY:
         return None
-    m1, p_nc, variance = float(limit.m1), float(limit.p_nc), float(limit.sd) ** 2
+    m1 = float(limit.m1)
+    p_nc = float(limit.p_nc)
+    variance = float(limit.sd) ** 2
     there = known(spec.scene, spec.energy)
     if there is None:
         return Theory(m1, p_nc, variance)
-    slower, left = there.mean_of_exp(-0.5), there.theory_error
+    slower = there.mean_of_exp(-0.5)
+    left = there.theory_error
     share = math.fsum(slower**k for k in range(spec.n_cycles)) / spec.n_cycles
     return Theory(
         m1 + share * (there.mean_s - m1),

@@ -115,13 +115,7 @@ def read_rows(
         rows = (row for row in reader if any(map(str.strip, row)) and not row[0].startswith("#"))
         try:
             names = _names(next(rows, []), label)
-            lacking = [name for name in needed if name not in names]
-            twice = [name for i, name in enumerate(names) if name in names[:i]]
-            unknown = [name for name in names if known and name not in known]
-            for fault, found in (("is missing", lacking), ("stands twice", twice), ("is unknown", unknown)):
-                if found:
-                    which = f"; columns are {', '.join(known)}" if known else ""
-                    raise BadInput(f"{label}: column {shown(found[0])} {fault}{which}")
+            _check_names(names, label, needed, known)
             for row in rows:
                 place = f"{label}:{reader.line_num}"
                 if len(row) != len(names):
@@ -201,6 +195,20 @@ def _names(row: Sequence[str], label: str) -> list[str]:
             if mark in names[0]:
                 raise BadInput(f"{label}: its columns are separated by {word}, must be by commas")
     return names
+
+
+def _check_names(
+    names: Sequence[str], label: str, needed: Sequence[str], known: Sequence[str] | None
+) -> None:
+    """Refuse columns of which one is missing, stands twice, or is unknown."""
+    lacking = [name for name in needed if name not in names]
+    twice = [name for i, name in enumerate(names) if name in names[:i]]
+    unknown = [name for name in names if known and name not in known]
+    faults = (("is missing", lacking), ("stands twice", twice), ("is unknown", unknown))
+    for fault, found in faults:
+        if found:
+            which = f"; columns are {', '.join(known)}" if known else ""
+            raise BadInput(f"{label}: column {shown(found[0])} {fault}{which}")
 
 
 def _miscounted(row: Sequence[str], names: Sequence[str]) -> str:

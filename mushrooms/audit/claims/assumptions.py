@@ -30,10 +30,12 @@ SCENES = ("moving-cap", "fixed-cap-clockwise")
 ENERGY = 1e7
 N_PARTICLES = {"quick": 2500, "full": 20_000}
 PHASES = (3 / 8, 4 / 8, 6 / 8, 1.0)
-OTHER_LEGS, IRREGULAR = "fixed-cap-other-legs@1e7", "fixed-cap-irregular@1e7"
+OTHER_LEGS = "fixed-cap-other-legs@1e7"
+IRREGULAR = "fixed-cap-irregular@1e7"
 N_CLOCKS = 3
 ROUNDING = 1e-12  # relative, of what a few thousand collisions keep exactly
-SLIDING_HITS, SLIDING_SPEED = 2000, 30.0
+SLIDING_HITS = 2000
+SLIDING_SPEED = 30.0
 SLOW = ("ergodic@1e4x120", "moving-cap-trivial@1e4x120")
 BOUNDED = ("breathing-circle", "moving-cap", "fixed-cap-clockwise")
 N_HITS = 3000
@@ -46,8 +48,10 @@ STARTS = ((0.3, 0.4, 0.3), (-0.5, 0.2, 1.1), (0.1, 0.6, 2.0), (0.0, 0.3, 2.9))  
 def filling(evidence: ClaimEvidence) -> Iterator[Check]:
     """C2: shares, places and directions in the chaotic zone at phases of the cycle."""
     for name in SCENES:
-        table, places = load(name), []
-        n, seed = N_PARTICLES[evidence.size], run_seed(evidence.seed, RUNS["moving-cap@1e7"], -2)
+        table = load(name)
+        places = []
+        n = N_PARTICLES[evidence.size]
+        seed = run_seed(evidence.seed, RUNS["moving-cap@1e7"], -2)
         states = starts(table, n, seed)
         for phase in PHASES:
             t = table.period * phase
@@ -78,7 +82,8 @@ def filling(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def starts(table: Scene, n: int, seed: int) -> list[State]:
     """Draw n states of ENERGY, uniform in area and direction at time 0."""
-    random, now = np.random.default_rng(seed), table_at(fp, table, 0.0)
+    random = np.random.default_rng(seed)
+    now = table_at(fp, table, 0.0)
     speed = math.sqrt(2 * ENERGY)
     found: list[State] = []
     while len(found) < n:
@@ -121,7 +126,8 @@ EVEN: tuple[tuple[str, int, str, Cdf], ...] = (
 
 def in_the_zone(table: Scene, t: float, rows: FloatArray) -> Zone:
     """Pick the zone's particles at time t from rows of x, y, vx, vy."""
-    now, nu = table_at(fp, table, t), float(theory.volumes_at(fp, table, t).nu)
+    now = table_at(fp, table, t)
+    nu = float(theory.volumes_at(fp, table, t).nu)
     x, y, vx, vy = rows.T
     offset = np.abs(x * vy - y * vx) / np.hypot(vx, vy) / now.r
     below = y < 0
@@ -148,7 +154,8 @@ def _unmixed(table: Scene, t: float) -> float:
     sides.
     """
     step = 1e-4 * table.period
-    (now, before), place = (theory.volumes_at(fp, table, s) for s in (t, t - step)), table_at(fp, table, t)
+    now, before = (theory.volumes_at(fp, table, s) for s in (t, t - step))
+    place = table_at(fp, table, t)
     rate = abs(now.v_stem / now.v_cha - before.v_stem / before.v_cha) / step
     both = now.v_stem * (now.v_cha - now.v_stem) / now.v_cha / (2 * fp.pi)
     return float(rate * fp.pi * both / (2 * place.w * math.sqrt(2 * ENERGY)))
@@ -231,7 +238,8 @@ def speeds(evidence: ClaimEvidence) -> list[Check]:
 def _at_most_linear(evidence: ClaimEvidence, name: str) -> Check:
     """Check v_n - v_0 <= 2 u n, u the fastest wall: in the wall's frame a hit only turns the speed."""
     table = load(name)
-    fastest, share = walls_speed(table), -math.inf
+    fastest = walls_speed(table)
+    share = -math.inf
     for x, y, turn in STARTS:
         start = State(0.0, x, y, 2 * fastest * math.cos(turn), 2 * fastest * math.sin(turn))
         done = evidence.steppers.trajectory(table, start, N_HITS, math.inf)
@@ -257,9 +265,11 @@ def walls_speed(scene: Scene) -> float:
 
 def _quadratic(sample: Sample) -> list[Check]:
     """Compare the mean speed's growth with a straight line, and its slope with theory."""
-    name, k = sample.run.name, sample.run.n_cycles
+    name = sample.run.name
+    k = sample.run.n_cycles
     v = sample.speed * np.exp(np.column_stack([np.zeros(sample.n), sample.s]) / 2)
-    half, whole = v[:, k // 2] - v[:, 0], v[:, -1] - v[:, 0]
+    half = v[:, k // 2] - v[:, 0]
+    whole = v[:, -1] - v[:, 0]
     accelerating = math.log2((math.exp(MOVING * k) - 1) / (math.exp(MOVING * k / 2) - 1))
     gain, left = _gain_of_a_cycle(sample, v[:, :-1])
     return [
@@ -290,7 +300,8 @@ def _gain_of_a_cycle(sample: Sample, v: FloatArray) -> tuple[float, float]:
     v (mean s / 2 + mean s^2 / 8), much the same at every speed: the mean of v is linear in time, E quadratic.
     Of speeds below the first one, at which rates may not be measured, that of the first is taken.
     """
-    scene, rows = scene_of(sample.run), []
+    scene = scene_of(sample.run)
+    rows = []
     grid = np.geomspace(max(np.quantile(v, SLOWEST), sample.speed), v.max(), N_SPEEDS)
     for speed in grid.tolist():
         found = theory.at_energy(scene, speed**2 / 2)

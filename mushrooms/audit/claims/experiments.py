@@ -85,10 +85,12 @@ def peak_place(evidence: ClaimEvidence, sample: Sample) -> Check:
 
 def peak_shape(sample: Sample) -> Check:
     """Test the uncaptured peak against the predicted one."""
-    kept, found = sample.gain[~sample.captured], predicted(sample)
+    kept = sample.gain[~sample.captured]
+    found = predicted(sample)
     what = f"{sample.run.name}: log E1/E0 of the never captured"
     still = norm(found.s_nc, found.peak[1] ** 0.5).cdf
-    note, rival = f"of a Gaussian at log E_nc {chance(kept, still):.1g}", ("a Gaussian at log E_nc", still)
+    note = f"of a Gaussian at log E_nc {chance(kept, still):.1g}"
+    rival = ("a Gaussian at log E_nc", still)
     return fits(what, kept, found.free_cdf, band=peak_band(found), scale=0.2, note=note, against=rival)
 
 
@@ -104,11 +106,13 @@ def peak_width(sample: Sample) -> Check:
 
 def captured_energies(sample: Sample) -> Check:
     """Test the captured's energies against the predicted ones."""
-    values, what = sample.gain[sample.captured], f"{sample.run.name}: log E1/E0 of the captured"
+    values = sample.gain[sample.captured]
+    what = f"{sample.run.name}: log E1/E0 of the captured"
     if len(values) < 2:
         return Check(what, None, "a sample", n_tests=1, note="no particles")
     sharp, found = adiabatic(sample).captured_cdf, predicted(sample).captured_cdf
-    note, rival = f"of the adiabatic theory {chance(values, sharp):.1g}", ("no blur", sharp)
+    note = f"of the adiabatic theory {chance(values, sharp):.1g}"
+    rival = ("no blur", sharp)
     return fits(what, values, found, band=captured_band(sample), scale=0.2, note=note, against=rival)
 
 
@@ -165,7 +169,8 @@ def capture_times(evidence: ClaimEvidence) -> Iterator[Check]:
     """X3: when particles are captured."""
     for run in ("moving-cap@1e7", *FIXED):
         sample = evidence.sample(run)
-        times, found = sample.first_capture[0][sample.captured], predicted(sample)
+        times = sample.first_capture[0][sample.captured]
+        found = predicted(sample)
         seen = seen_late(found.capture_cdf, times, chord_time(sample))
         yield fits(
             f"{run}: times of capture",
@@ -179,8 +184,10 @@ def capture_times(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def ergodic(evidence: ClaimEvidence) -> list[Check]:
     """X5: c = 0."""
-    sample, earlier = evidence.sample("ergodic@1e7"), evidence.sample("ergodic@1e6")
-    found, left = predicted(sample), predicted(sample).theory_error
+    sample = evidence.sample("ergodic@1e7")
+    earlier = evidence.sample("ergodic@1e6")
+    found = predicted(sample)
+    left = predicted(sample).theory_error
     ratio = (found.peak[1] / predicted(earlier).peak[1]) ** 0.5
     return [
         less_bias(GROWTH, sample, 0.0, start=""),
@@ -199,7 +206,8 @@ def ergodic(evidence: ClaimEvidence) -> list[Check]:
 
 def untilted(evidence: ClaimEvidence) -> list[Check]:
     """X6: with an upright stem the chaotic zone's energies are distributed differently."""
-    upright, tilted = evidence.sample("untilted@1e6"), evidence.sample("moving-cap@1e6")
+    upright = evidence.sample("untilted@1e6")
+    tilted = evidence.sample("moving-cap@1e6")
     centred = []
     for sample in (tilted, upright):
         kept = sample.gain[~sample.captured]
@@ -281,7 +289,8 @@ def both_ways(evidence: ClaimEvidence) -> Iterator[Check]:
         )
     for first, second in ((ACW, CW), ("moving-cap@1e6", "moving-cap-reversed@1e6")):
         pair = [evidence.sample(first), evidence.sample(second)]
-        kept, biases = [PEAK.measured(s) for s in pair], sum(PEAK.bias(s) for s in pair)
+        kept = [PEAK.measured(s) for s in pair]
+        biases = sum(PEAK.bias(s) for s in pair)
         yield close(
             f"{first} and its reverse: sum of the peaks, less their biases",
             (kept[0].value + kept[1].value - biases, float(np.hypot(kept[0].error, kept[1].error))),

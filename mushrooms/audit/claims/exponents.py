@@ -42,7 +42,8 @@ if TYPE_CHECKING:
 SPEEDS = tuple(10.0 ** (k / 2) for k in range(4, 9))  # 100 to 10,000
 N_ORBITS = 12
 DURATION = 1.0  # of the 2 pi of a cycle: O(v) hits
-KT, HOTTER = 50.0, 2.0
+KT = 50.0
+HOTTER = 2.0
 N_POINTS = {"quick": 400_000, "full": 4_000_000}
 N_ENERGIES = {"quick": 400, "full": 2000}
 PER_ENERGY = 20
@@ -118,8 +119,10 @@ def _orbit(
     r, middle = np.split(values(scene.r, times), [len(t)])  # type: ignore[union-attr]
     after = np.hypot(vx, vy)
     before = np.concatenate([[speed], after[:-1]])  # the base stands still
-    phi, flown = np.arcsin(momentum / (r * before)), np.arcsin(momentum[:-1] / (middle * after[:-1]))
-    product, u_over_v = before * r, values(scene.r, t, 1) / before  # type: ignore[union-attr]
+    phi = np.arcsin(momentum / (r * before))
+    flown = np.arcsin(momentum[:-1] / (middle * after[:-1]))
+    product = before * r
+    u_over_v = values(scene.r, t, 1) / before  # type: ignore[union-attr]
     turned = np.arcsin(momentum / (r * after)) - phi - 2 * u_over_v * np.sin(phi)
     slowed = after / before - 1 + 2 * u_over_v * np.cos(phi)
     return {
@@ -185,7 +188,8 @@ def log_volume(sample: Sample, phase: float) -> float:
 
 def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: float) -> Check:
     """Compare the exponent of E0 with an expected one, the next order, ~ 1/v, being fitted beside it."""
-    fit, energies = fitted(samples, values, -0.5), [sample.run.energy for sample in samples]
+    fit = fitted(samples, values, -0.5)
+    energies = [sample.run.energy for sample in samples]
     return close(
         what,
         (fit.exponent, fit.exponent_error),
@@ -226,8 +230,12 @@ def _points(
 ) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Draw points in a box around the table; tell which lie in it, in the cap, in the island."""
     table = table_at(fp, scene, t)
-    r, h, w = table.r, table.h, table.w
-    x, y, turn = random.uniform(-r, r, n), random.uniform(-h, r, n), random.uniform(0, 2 * np.pi, n)
+    r = table.r
+    h = table.h
+    w = table.w
+    x = random.uniform(-r, r, n)
+    y = random.uniform(-h, r, n)
+    turn = random.uniform(0, 2 * np.pi, n)
     in_cap = (y >= 0) & (table.gap("arc", x, y) >= 0)
     in_stem = (y < 0) & (np.abs(x) <= table.half_width(y))
     momentum = np.abs(x * np.sin(turn) - y * np.cos(turn))
@@ -262,7 +270,8 @@ def _largest_gap(sample: Sample) -> float:
     moved by r'' dt^2 / 2 beyond what the speed lost, dt = 2 r cos(phi)/v; and sin(phi) = L/(v r) as much.
     """
     scene = scene_of(sample.run)
-    arc, mouth = bounds(laws(scene)["r"]), bounds(laws(scene)["nu"])
+    arc = bounds(laws(scene)["r"])
+    mouth = bounds(laws(scene)["nu"])
     return float(
         2 * 2 * arc.highest * mouth.slope + (2 * arc.slope + scene.period * arc.slope**2 / arc.lowest)
     )
@@ -280,7 +289,8 @@ def energy_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
         sample = evidence.sample(run)
         times, means = zone_energy(sample)
         found = predicted(sample)
-        expected, wait = found.zone(times)[0], found.zone(np.array(times) - chord_time(sample))[0]
+        expected = found.zone(times)[0]
+        wait = found.zone(np.array(times) - chord_time(sample))[0]
         for k in range(every - 1, len(times), every):
             yield close(
                 f"{run}: mean log E/E0 at phase {sample.run.phases[k]:g}",
@@ -295,7 +305,8 @@ def energy_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def _lag_at_capture(sample: Sample) -> Check:
     """Compare log E of captured particles, which a cap at rest keeps, with what they had when captured."""
-    found, times = predicted(sample), sample.first_capture[0]
+    found = predicted(sample)
+    times = sample.first_capture[0]
     k = int(np.argmax(sample.phase_captured[:, 0].sum(axis=0)))
     inside = sample.phase_captured[:, 0, k] & sample.captured
     expected = found.at_capture(times[inside])[0]
@@ -322,9 +333,12 @@ def population_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
     """L6: p_cha(t) against eq. (ps), with what lags do to it."""
     for run, every in (("moving-cap@1e7", 2), (ACW, 1), ("fixed-cap-anticlockwise@1e7", 1)):
         sample = evidence.sample(run)
-        times, wait = np.array(phase_times(sample)), chord_time(sample)
-        expected, earlier = share_in_the_zone(sample, times), share_in_the_zone(sample, times - wait)
-        measured, left = zone_share(sample, times), predicted(sample).theory_error
+        times = np.array(phase_times(sample))
+        wait = chord_time(sample)
+        expected = share_in_the_zone(sample, times)
+        earlier = share_in_the_zone(sample, times - wait)
+        measured = zone_share(sample, times)
+        left = predicted(sample).theory_error
         for k in range(every - 1, len(times), every):
             p = float(expected[k])
             error = math.sqrt(max(p * (1 - p), 1 / sample.n) / sample.n)
@@ -342,7 +356,8 @@ def work(evidence: ClaimEvidence) -> Iterator[Check]:
     phases = (0.25, 0.5, 0.75)
     scene = load("moving-cap")
     random = np.random.default_rng(run_seed(evidence.seed, RUNS["moving-cap@1e3"], -1))
-    rows, n_lost = [], 0
+    rows = []
+    n_lost = 0
     for k, energy in enumerate(random.exponential(HOTTER * KT, N_ENERGIES[evidence.size])):
         seed = run_seed(evidence.seed, RUNS["moving-cap@1e3"], -2 - k)
         done = evidence.steppers.simulate(

@@ -39,7 +39,8 @@ WIDENED = 0.121  # largest change of the normal distribution function per relati
 SKEWED = 0.0665  # and per skewness
 N_DRAWN = 400_000  # sums of cycles: their own error is a fifth of that of 16,000 particles
 DRAWN_SEED = 20140317
-ACW, CW = "fixed-cap-anticlockwise@1e9", "fixed-cap-clockwise@1e9"
+ACW = "fixed-cap-anticlockwise@1e9"
+CW = "fixed-cap-clockwise@1e9"
 LADDER = tuple(f"moving-cap@1e{k}" for k in range(3, 12))
 ERGODIC = tuple(f"ergodic@1e{k}" for k in range(4, 8))
 FIXED = (ACW, CW, "fixed-cap-anticlockwise@1e7", "fixed-cap-clockwise@1e7")
@@ -137,7 +138,8 @@ def width(sample: Sample) -> Mean:
 
 def width_as_predicted(what: str, found: Mean, sample: Sample, **options: Any) -> Check:
     """Compare the width of a sample's peak with that which frozen tables predict."""
-    sigma, left = predicted(sample).peak[1] ** 0.5, predicted(sample).theory_error
+    sigma = predicted(sample).peak[1] ** 0.5
+    left = predicted(sample).theory_error
     return close(what, found, sigma, band=sigma * left.variance / 2, **options)
 
 
@@ -151,14 +153,16 @@ def peak_band(found: theory.FiniteEnergy) -> float:
 def captured_band(sample: Sample) -> float:
     """Return the same of the captured: a kernel's change moves them no more than it does the peak."""
     found = predicted(sample)
-    gains, left = sample.gain[sample.captured], found.theory_error
+    gains = sample.gain[sample.captured]
+    left = found.theory_error
     steep = steepest(found.captured_cdf, gains.min(), gains.max())
     return steep * left.captured_mean + WIDENED * left.variance + SKEWED * left.skewness
 
 
 def zone_energy(sample: Sample) -> tuple[list[float], list[Mean]]:
     """Return times of the phases, and mean log E/E0 of those not captured so far."""
-    times, means = phase_times(sample), []
+    times = phase_times(sample)
+    means = []
     for k, time in enumerate(times):
         with np.errstate(invalid="ignore"):
             free = ~sample.captured | (time < sample.first_capture[0])
@@ -182,7 +186,8 @@ def captured_change(sample: Sample, first: int, last: int) -> FloatArray:
 
 def share_in_the_zone(sample: Sample, times: FloatArray) -> FloatArray:
     """Return the predicted share of particles in the chaotic zone, for cycles with a single well."""
-    curve, found = theory.capture_curve(scene_of(sample.run), N_PLACES), predicted(sample)
+    curve = theory.capture_curve(scene_of(sample.run), N_PLACES)
+    found = predicted(sample)
     # Who was captured first is released last: inside are those captured before this time.
     latest = np.minimum(times, np.interp(times, curve.t_out[::-1], curve.t_in[::-1]))
     return np.asarray(1 - (1 - found.p_nc) * found.capture_cdf(latest), dtype=np.float64)
@@ -198,7 +203,8 @@ class Sums:
 
     def __init__(self, drawn: FloatArray) -> None:
         self.values: FloatArray = np.sort(drawn)
-        self.mean, self.sd = float(drawn.mean()), float(drawn.std())
+        self.mean = float(drawn.mean())
+        self.sd = float(drawn.std())
 
     @property
     def cdf(self) -> Cdf:
@@ -216,9 +222,11 @@ def summed(run: str, n_cycles: int) -> Sums:
 
 def period(evidence: ClaimEvidence) -> Iterator[Check]:
     """M5: for which period of sec. 4.1 the printed error bars come out, given our widths at T = 1."""
-    lowest, highest = 0.0, np.inf
+    lowest = 0.0
+    highest = np.inf
     for name in (ACW, CW):
-        sample, (_, bar, n, per_bar) = evidence.sample(name), PRINTED[name]
+        sample = evidence.sample(name)
+        _, bar, n, per_bar = PRINTED[name]
         sd, error = _spread_beside(sample, n)
         sharp = float(evidence.theory_of(sample).sd)
         extra = sd**2 - sharp**2  # ~ 1 / (v T)
@@ -275,7 +283,8 @@ def width_exponent(evidence: ClaimEvidence) -> Iterator[Check]:
     """M7: the exponent of the peak's width."""
     for label, runs in WIDTHS:
         samples = evidence.samples(*runs)
-        fit, band = fitted(samples, [width(sample) for sample in samples]), _bend(samples)
+        fit = fitted(samples, [width(sample) for sample in samples])
+        band = _bend(samples)
         energies = [sample.run.energy for sample in samples]
         text = f"E0 {energies[0]:.0e} to {energies[-1]:.0e}: {fit.coefficient:.3g} E0^{fit.exponent:.4f}"
         measured = (fit.exponent, fit.exponent_error)
@@ -330,7 +339,9 @@ def fitted(samples: list[Sample], values: list[Mean], *orders: float) -> theory.
 def ergodic_mean(evidence: ClaimEvidence) -> list[Check]:
     """M8: |m1*| < 3e-5 for c = 0."""
     sample = evidence.sample("ergodic@1e7")
-    sd, found, theirs = spread(sample.gain), mean(sample.gain), predicted(sample)
+    sd = spread(sample.gain)
+    found = mean(sample.gain)
+    theirs = predicted(sample)
     chance = sd.value / np.sqrt(25_000)
     drift = theirs.mean_s
     luck, more = (float(np.diff(norm.cdf([-x, x], drift, chance))[0]) for x in (3e-5, 3e-4))
@@ -385,7 +396,8 @@ def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
     )
     half = float(theory.unbiased_mean(load("moving-cap")))
     for sample in samples:
-        added, left = GROWTH.bias(sample), GROWTH.band(sample)
+        added = GROWTH.bias(sample)
+        left = GROWTH.band(sample)
         yield from [
             close(
                 f"{sample.run.name}: mean of s, less the predicted bias {added:.2g}",

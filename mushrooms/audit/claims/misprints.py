@@ -50,15 +50,18 @@ def half_angle(evidence: ClaimEvidence) -> list[Check]:
     """M1: the mouth as printed, sin²(t), and with the half angle."""
     try:
         scenes.load("moving-cap-as-printed")
-        message, is_valid = "valid", True
+        message = "valid"
+        is_valid = True
     except scenes.InvalidScene as error:
-        message, is_valid = str(error).partition(": ")[2], False
+        message = str(error).partition(": ")[2]
+        is_valid = False
     upright = Mushroom(  # valid, as its slope is 0: the loop can be solved
         r=scenes.Fourier(1.0, 1.0, (), (0.5,)),
         h=scenes.Fourier(1.0, 1.0, (), (-0.5,)),
         nu=scenes.Fourier(0.6, 1.0, (0.0, 0.4)),
     )
-    as_printed, corrected = evidence.predict(upright), evidence.predict("moving-cap")
+    as_printed = evidence.predict(upright)
+    corrected = evidence.predict("moving-cap")
     return [
         stated("sin²(t): the table is valid through the cycle", is_valid, message, "valid", form="printed"),
         stated(
@@ -140,7 +143,8 @@ def exponent_sign(evidence: ClaimEvidence) -> Iterator[Check]:
         w0, w1, h, _, slope = fixed_cap(name)
         with mpmath.workdps(DIGITS):
             integral = mpmath.quad(partial(capture_rate, h=h, slope=slope), [w0, w1])
-            minus, plus = mpmath.exp(-integral), mpmath.exp(integral)
+            minus = mpmath.exp(-integral)
+            plus = mpmath.exp(integral)
         theirs = evidence.predict(name).p_nc
         yield from [
             stated(
@@ -162,7 +166,8 @@ def fixed_cap(name: str) -> tuple[Any, Any, Any, Any, Any]:
     knots, depths = (given[law].knots for law in ("w", "h"))  # type: ignore[union-attr]
     closing = next(i for i in range(len(knots) - 1) if knots[i + 1][1] < knots[i][1])
     opening = next(i for i in range(len(knots) - 1) if knots[i + 1][1] > knots[i][1])
-    w1, w0 = mpmath.mpf(knots[closing][1]), mpmath.mpf(knots[closing + 1][1])
+    w1 = mpmath.mpf(knots[closing][1])
+    w0 = mpmath.mpf(knots[closing + 1][1])
     return w0, w1, *(mpmath.mpf(x) for x in (depths[closing][1], depths[opening][1], given["slope"]))
 
 
@@ -186,9 +191,12 @@ def cone(evidence: ClaimEvidence) -> Iterator[Check]:
     """M10: which end the cone |x| <= w + y tan theta has, y = h as printed or y = -h: where it is met."""
     table = scenes.load("frozen-mushroom")
     done = evidence.steppers.trajectory(table, State(0.0, 0.1, -0.2, 0.3, -1.0), N_HITS, fp.inf)
-    now, x, y = table_at(fp, table, 0.0), done.steps[:, 2], done.steps[:, 3]
+    now = table_at(fp, table, 0.0)
+    x = done.steps[:, 2]
+    y = done.steps[:, 3]
     at = {wall: np.array([met == wall for met in done.walls]) for wall in ("left", "right", "floor")}
-    sides, floor = at["left"] | at["right"], at["floor"]
+    sides = at["left"] | at["right"]
+    floor = at["floor"]
     lowest = float(y.min())
     for end, form in zip((now.h, -now.h), FORMS, strict=True):
         label = "y = h" if end > 0 else "y = -h"
@@ -239,7 +247,8 @@ def loop_plane(evidence: ClaimEvidence) -> Iterator[Check]:
         ),
     ]
     for name in ("moving-cap", "fixed-cap-anticlockwise"):
-        turn, found = loop_area(name), evidence.predict(name)
+        turn = loop_area(name)
+        found = evidence.predict(name)
         yield stated(
             f"plane (V_ell/V_cap, V_cap/V): {name} has an area, and growth",
             abs(turn) > ZERO and found.m1 > 0,
@@ -255,7 +264,8 @@ def measures(evidence: ClaimEvidence) -> list[Check]:
     start = theory.volumes_at(fp, table, 0.0)  # nu = 0.9 at most: an island remains
     p_nc = float(evidence.predict(table).p_nc)
     free = start.v_cha / (start.v_cap + start.v_stem)
-    energy, area = 2.0, 1.0
+    energy = 2.0
+    area = 1.0
     printed = 2 * fp.pi * fp.sqrt(2 * energy) * area
     rate = 2 * fp.pi * ((energy + 1) - (energy - 1)) * area / 2  # of the volume below H = E: a disk times A
     return [
@@ -348,7 +358,8 @@ def _over_w(w0: Any, w1: Any, h_in: Any, h_out: Any, slope: Any) -> tuple[Any, A
 def positivity(evidence: ClaimEvidence) -> Iterator[Check]:
     """N3: m1 >= 0 for any cycle, several captures included."""
     random = np.random.default_rng(evidence.seed)
-    least, n_nested = np.inf, 0
+    least = np.inf
+    n_nested = 0
     for k in range(N_DRAWN_LOOPS):
         a, b = random.uniform(-0.3, 0.3, 2)
         second = 0.12 * (k % 2)  # a second harmonic gives nu two wells

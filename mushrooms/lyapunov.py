@@ -1,12 +1,12 @@
 """Finite-time Lyapunov exponents: how fast neighbouring particles separate along an orbit.
 
-Idea. The reference proves each step of an orbit and gives the Jacobian d(dt, x, y, vx, vy) / d(t, x, y, vx,
-vy). The product of these stretches a small deviation. Lengths are in units of the table, and velocities in
-units of the present speed. The exponent after n collisions is the mean of the logs of the stretches. Its
-error is the standard error over N_BLOCKS equal parts of the orbit. This holds if a part is longer than the
-memory of the orbit. It is an error of the mean along this orbit. In the chaotic zone orbits stick near
-islands for long times, which a single orbit does not show. In an island the exponent falls as (log n) / n
-to 0.
+Idea. The reference proves each step of an orbit and gives the Jacobian d(dt, x, y, vx, vy) / d(t,
+x, y, vx, vy). The product of these stretches a small deviation. Lengths are in units of the table,
+and velocities in units of the present speed. The exponent after n collisions is the mean of the
+logs of the stretches. Its error is the standard error over N_BLOCKS equal parts of the orbit. This
+holds if a part is longer than the memory of the orbit. It is an error of the mean along this orbit.
+In the chaotic zone orbits stick near islands for long times, which a single orbit does not show. In
+an island the exponent falls as (log n) / n to 0.
 
 The Jacobians belong to the states in binary64. Each is right to some 16 digits.
 """
@@ -62,11 +62,21 @@ def jacobians(orbit: FollowedOrbit, progress: Callable[[int], None] | None = Non
         before = orbit.state(k)
         after = orbit.state(k + 1).t
         end = after + (after - before.t) + math.ulp(after)  # a horizon safely beyond the known hit
-        proved = reference.next_collision(orbit.scene, before, end, digits=DIGITS, is_differentiated=True)
+        proved = reference.next_collision(
+            orbit.scene, before, end, digits=DIGITS, is_differentiated=True
+        )
         if isinstance(proved, Undecided):
-            raise BadInput(f"collision {k + 1} of the orbit: the reference is undecided, {proved.reason}")
-        if not isinstance(proved, reference.Collision) or proved.jacobian is None or proved.wall != wall:
-            raise BadInput(f"collision {k + 1} of the orbit: {wall} is not what the reference proves")
+            raise BadInput(
+                f"collision {k + 1} of the orbit: the reference is undecided, {proved.reason}"
+            )
+        if (
+            not isinstance(proved, reference.Collision)
+            or proved.jacobian is None
+            or proved.wall != wall
+        ):
+            raise BadInput(
+                f"collision {k + 1} of the orbit: {wall} is not what the reference proves"
+            )
         out[k] = [[float(entry) for entry in row] for row in proved.jacobian]
         out[k, 0, 0] += 1.0  # the row is that of dt, and t after is t + dt
         if progress is not None:

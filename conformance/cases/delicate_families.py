@@ -1,10 +1,10 @@
-"""Families at ties: on corners and knots, at the horizon, at residuals, beside laws that all but vanish.
+"""Families at ties: corners, knots, the horizon, residuals, and laws that all but vanish.
 
-Most numbers are short dyadic ones, so that ties are exact. The residual f(0) of the wall being left, down
-to 1e-90 and of either sign, decides what is met where the flight returns to its wall exactly when something
-else happens: a crossing of y = 0, a corner, the horizon. A value whose terms are known well may be known
-badly itself where waves cancel to a part of 1e-4 to 1e-13: what is looked for there is near such a wall by
-parts of what is left of it.
+Most numbers are short dyadic ones, so that ties are exact. The residual f(0) of the wall being
+left, down to 1e-90 and of either sign, decides what is met where the flight returns to its wall
+exactly when something else happens: a crossing of y = 0, a corner, the horizon. A value whose terms
+are known well may be known badly itself where waves cancel to a part of 1e-4 to 1e-13: what is
+looked for there is near such a wall by parts of what is left of it.
 """
 
 import math
@@ -15,7 +15,16 @@ from mpmath import MPContext
 
 from conformance import plain
 from conformance.cases.draw import NEVER, Draw, Family, Question, Unfit
-from conformance.cases.scenes import SIDES, TABLES, Clock, clock, many_legs, off_its_wall, scene, state
+from conformance.cases.scenes import (
+    SIDES,
+    TABLES,
+    Clock,
+    clock,
+    many_legs,
+    off_its_wall,
+    scene,
+    state,
+)
 from scene import BangBang, Cap, Collision, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.laws import value
 from scene.tables import laws
@@ -35,17 +44,22 @@ def at_or_next_to(draw: Draw, t: float) -> float:
 
 
 def moved(draw: Draw, size: float, at: float) -> Law:
-    """Draw a law that is `size` at time `at`, at rest then or half way down a leg; sometimes a number."""
+    """Draw a law that is `size` at time `at`, at rest then or half way down a leg.
+
+    Sometimes a number.
+    """
     if draw.pick((True, False)):
         return size
     other = size * draw.pick((0.75, 0.875, 1.125, 1.25))
     if draw.pick((True, False)):
         return BangBang(knots=((at, size), (at + 1.0, other), (at + PERIOD, size)))
-    return BangBang(knots=((at - 1.0, 2 * size - other), (at + 1.0, other), (at + 3.0, 2 * size - other)))
+    return BangBang(
+        knots=((at - 1.0, 2 * size - other), (at + 1.0, other), (at + 3.0, 2 * size - other))
+    )
 
 
 def dyadic(draw: Draw, at: float) -> tuple[Scene, list[tuple[float, float]]]:
-    """Draw a scene of short dyadic sizes at time `at`, and list its corners and edges of then, x > 0.
+    """Draw a scene of short dyadic sizes at time `at`, and list its corners and edges, x > 0.
 
     A length moves by at most a quarter of itself: h slope <= 0.08 < 0.18 <= w <= 0.47 < 0.75 <= r.
     """
@@ -73,7 +87,9 @@ def corner_start(draw: Draw) -> Question:
     t = PERIOD * draw.pick((0, 0, 1, -3, 100))
     wall: Wall | None = draw.pick((*of.walls, None))
     return Question(
-        of, State(t, x, y, draw.pick(SPEEDS), draw.pick(SPEEDS), wall), t + draw.pick((0.0, 2.0**-20, 5.0))
+        of,
+        State(t, x, y, draw.pick(SPEEDS), draw.pick(SPEEDS), wall),
+        t + draw.pick((0.0, 2.0**-20, 5.0)),
     )
 
 
@@ -98,7 +114,7 @@ def corner_arrival(draw: Draw) -> Question:
 
 
 def hit_at_end(draw: Draw) -> Question:
-    """Fly straight at a wall that is met exactly at the horizon, or a unit in the last place beside it.
+    """Fly straight at a wall that is met at the horizon, or a unit in the last place beside it.
 
     Sometimes the wall rests at a knot then, behind which is a violent leg.
     """
@@ -132,12 +148,15 @@ def hit_at_end(draw: Draw) -> Question:
 def knot_at_event(draw: Draw) -> Question:
     """Put a knot next to the time of a hit, or of a crossing of y = 0, on a path that is known.
 
-    The path is followed with all walls at rest. The law that decides it then has a sudden leg: before that
-    time, after it or within its rounding. Which side of it the time lies on decides the outcome, and a
-    stepper that knows the time only to some digits must keep both.
+    The path is followed with all walls at rest. The law that decides it then has a sudden leg:
+    before that time, after it or within its rounding. Which side of it the time lies on decides the
+    outcome, and a stepper that knows the time only to some digits must keep both.
     """
     of = Mushroom(
-        r=draw.short(0.6, 1.5), w=draw.short(0.1, 0.4), h=draw.short(0.3, 2.0), slope=draw.short(-0.2, 0.004)
+        r=draw.short(0.6, 1.5),
+        w=draw.short(0.1, 0.4),
+        h=draw.short(0.3, 2.0),
+        slope=draw.short(-0.2, 0.004),
     )
     start, _ = state(draw, of, {"t": 0.0, "site": draw.pick(("cap", "stem")), "speed": 0.25})
     before: list[Any] = [start, *plain.trajectory(of, start, 3, NEVER)]
@@ -162,7 +181,8 @@ def knot_at_event(draw: Draw) -> Question:
     late = State(turns, start.x, start.y, start.vx, start.vy, start.wall)
     bits = math.log2(max(turns, 1.0)) - math.log2(width) + draw.pick(range(-16, 4))
     working = min(max(round((bits - 8) / math.log2(10)), 6), 60)
-    return Question(Mushroom(**known | {name: leg}), late, NEVER, n + draw.pick((0, 1)), working=working)  # type: ignore[arg-type]
+    other_scene = Mushroom(**known | {name: leg})  # type: ignore[arg-type]
+    return Question(other_scene, late, NEVER, n + draw.pick((0, 1)), working=working)
 
 
 def across_a_knot(draw: Draw) -> Question:
@@ -173,7 +193,8 @@ def across_a_knot(draw: Draw) -> Question:
     (t0, _), (t1, _) = law.knots[0:2]
     t = period * draw.pick((0, 0, 1, 100, 1000)) + t1 - (t1 - t0) * 10.0 ** -draw.between(0.5, 6.0)
     sizes: dict[str, Law] = {"r": 4.0, "h": 1.0, "w": 0.3, which: law}
-    wall: Wall = {"r": "arc", "h": "floor", "w": draw.pick(SIDES)}[which]  # type: ignore[assignment]
+    walls: dict[str, Wall] = {"r": "arc", "h": "floor", "w": draw.pick(SIDES)}
+    wall = walls[which]
     of = Mushroom(**sizes)  # type: ignore[arg-type]
     leaving, _ = state(
         draw, of, {"t": t, "site": wall, "speed": draw.power(-6, 0), "lift": draw.power(-50, -3)}
@@ -182,7 +203,7 @@ def across_a_knot(draw: Draw) -> Question:
 
 
 def rise_and_fall(low: float, high: float, t: float) -> tuple[BangBang, float]:
-    """Return a law that rises for a time 1 and falls for a time 1, and its value at t and at 2 - t."""
+    """Return a law that rises and falls for a time 1 each, and its value at t and at 2 - t."""
     share = 2 * t * t if t <= 0.5 else 1 - 2 * (1 - t) * (1 - t)
     return BangBang(knots=((0.0, low), (1.0, high), (2.0, low))), low + (high - low) * share
 
@@ -226,18 +247,24 @@ def on_the_wall(draw: Draw) -> Question:
         return Question(of, off_its_wall(draw, of, leaving), max(t_end, t + 8.0))
     by = 1.0 - draw.power(-12, -4)
     return Question(
-        of, msgspec.structs.replace(leaving, x=leaving.x * by, y=leaving.y * by), max(t_end, t + 8.0)
+        of,
+        msgspec.structs.replace(leaving, x=leaving.x * by, y=leaving.y * by),
+        max(t_end, t + 8.0),
     )
 
 
 def extreme_scale(draw: Draw) -> Question:
-    """Ask a plain question with lengths and times scaled by powers of two up to 2^+-390, together."""
+    """Ask a plain question with lengths and times scaled by powers of two up to 2^+-390."""
     of = scene(draw, draw.pick(TABLES), clock(draw))
     start, t_end = state(draw, of, {})
     length = draw.pick(range(-LARGEST, LARGEST + 1))
     units = draw.pick(range(-LARGEST, LARGEST + 1))
-    units = min(max(units, length - 380), length + 380)  # speeds beyond 2^400 are refused by every stepper
-    return Question(scaled(of, length, units), scaled_state(start, length, units), 2.0**units * t_end)
+    units = min(
+        max(units, length - 380), length + 380
+    )  # speeds beyond 2^400 are refused by every stepper
+    return Question(
+        scaled(of, length, units), scaled_state(start, length, units), 2.0**units * t_end
+    )
 
 
 def rest_and_sweep(draw: Draw) -> Question:
@@ -248,11 +275,16 @@ def rest_and_sweep(draw: Draw) -> Question:
     vx, vy = (size * number for number in draw.direction())
     if isinstance(of, Mushroom) and start.y == 0:
         vy = abs(vy) + draw.power(-9, 0)
-    return Question(of, State(start.t, start.x, start.y, vx, vy), start.t + draw.pick((1.0, 7.0, 30.0)))
+    return Question(
+        of, State(start.t, start.x, start.y, vx, vy), start.t + draw.pick((1.0, 7.0, 30.0))
+    )
 
 
 def slow_towards_waves(draw: Draw) -> Question:
-    """Come within thousands of periods to a wall of several harmonics, never all at their least together."""
+    """Meet a wall of several harmonics after thousands of periods.
+
+    The harmonics are never all at their least together.
+    """
     sin, cos = (tuple(draw.between(-0.05, 0.05) for _ in range(n)) for n in (3, 2))
     law = Fourier(mean=1.0, period=draw.pick((1.0, 0.375)), sin=(0.1, *sin), cos=cos)
     v = 10.0 ** -draw.between(2.0, 5.0)
@@ -269,7 +301,10 @@ def slow_towards_waves(draw: Draw) -> Question:
 
 
 def sunk(n: int, left: float, least: float = 0.0) -> Fourier:
-    """Return ((1 - cos 2 pi (t - least)) / 2)^n + left, of period 1: flatter at its least the higher n is."""
+    """Return ((1 - cos 2 pi (t - least)) / 2)^n + left, of period 1.
+
+    The higher n is, the flatter is the law at its least.
+    """
     waves = [math.comb(2 * n, n - k) * (-1.0) ** k * 2.0 / 4.0**n for k in range(1, n + 1)]
     angles = [2 * math.pi * k * least for k in range(1, n + 1)]
     cos = tuple(wave * math.cos(angle) for wave, angle in zip(waves, angles, strict=True))
@@ -281,11 +316,16 @@ def _next_to_nothing(draw: Draw) -> tuple[Fourier, float]:
     """Draw a law of which little is left, and a time about its least; by rounding it may vanish."""
     least = draw.pick((0.0, 0.25, draw.part(), draw.part()))
     law = sunk(draw.pick((1, 1, 2)), 10.0 ** -draw.between(4.0, 13.0), least)
-    return law, least + draw.pick((0.0, 1.0, -3.0)) + draw.pick((1.0, -1.0)) * 10.0 ** -draw.between(3.0, 8.0)
+    return law, least + draw.pick((0.0, 1.0, -3.0)) + draw.pick(
+        (1.0, -1.0)
+    ) * 10.0 ** -draw.between(3.0, 8.0)
 
 
 def nearly_shut(draw: Draw) -> Question:
-    """Start, or cross the mouth, beside a wall that all but vanishes, by a small part of what is left."""
+    """Start, or cross the mouth, beside a wall that all but vanishes.
+
+    The distance is a small part of what is left of the wall.
+    """
     law, t = _next_to_nothing(draw)
     part = draw.pick((1.0, -1.0)) * 10.0 ** -draw.between(4.0, 11.0)
     size = float(value(FINE, law, FINE.mpf(t)) * (1 + FINE.mpf(part)))
@@ -317,7 +357,10 @@ def all_but_gone(draw: Draw) -> Question:
 FAMILIES = (
     Family("corner-start", "a named wall hides that the place lies on a second one", corner_start),
     Family(
-        "corner-arrival", "an edge missed by 1e-8 to 1e-15, or not at all", corner_arrival, is_delicate=True
+        "corner-arrival",
+        "an edge missed by 1e-8 to 1e-15, or not at all",
+        corner_arrival,
+        is_delicate=True,
     ),
     Family(
         "hit-at-end",
@@ -327,7 +370,8 @@ FAMILIES = (
     ),
     Family(
         "knot-at-event",
-        "one piece of a law decides, though the enclosed time of an event or a crossing touches several",
+        "one piece of a law decides, though the enclosed time of an event or a crossing touches"
+        " several",
         knot_at_event,
         is_delicate=True,
     ),
@@ -339,8 +383,14 @@ FAMILIES = (
         is_delicate=True,
     ),
     Family("on-the-wall", "a state is on its wall by the largest size of all time", on_the_wall),
-    Family("extreme-scale", "squares overflow or vanish, though every number is in range", extreme_scale),
-    Family("rest-and-sweep", "a particle at rest is never hit, or divided by its speed", rest_and_sweep),
+    Family(
+        "extreme-scale",
+        "squares overflow or vanish, though every number is in range",
+        extreme_scale,
+    ),
+    Family(
+        "rest-and-sweep", "a particle at rest is never hit, or divided by its speed", rest_and_sweep
+    ),
     Family(
         "slow-towards-waves",
         "walls go as far as all their waves together: the first hit is lost",

@@ -1,13 +1,13 @@
-"""Somebody else's ensemble, held to what the paper claims for its scene: one cycle, and sums of several.
+"""An ensemble of another program, compared with what the paper claims for its scene.
 
-Each figure is a `Check`, as in the audit: theory at that energy with what it leaves out, the departure that a
-sample of this size would show, and the power against a rival. A scene without frozen rates has the adiabatic
-theory only; then a band is granted that no rates confirm, (walls' speed / particles' speed)^(2/3), the order
-of the first correction.
+Each figure is a `Check`, as in the audit: theory at that energy with what it leaves out, the
+departure that a sample of this size would show, and the power against a rival. A scene without
+frozen rates has the adiabatic theory only; then a band is granted that no rates confirm, (walls'
+speed / particles' speed)^(2/3), the order of the first correction.
 
-Where a check fails, rivals tell what is likely wrong: each is a mistake that people make, known by what it
-does to log E1/E0 or to the capture intervals. One is named when the whole distribution is within chance of
-its own, and no more than a third as far off as theory's.
+Where a check fails, rivals tell what is likely wrong: each is a mistake that people make, known by
+what it does to log E1/E0 or to the capture intervals. One is named when the whole distribution is
+within chance of its own, and no more than a third as far off as theory's.
 
 Not handled: starts of several energies, tables other than mushrooms.
 """
@@ -60,7 +60,8 @@ MOST_SORTED = 1_000_000  # values whose whole distribution is tested; of more, e
 N_TIMES = 4096  # of a cycle, at which laws are looked at
 FEW = 20  # particles below which a group says nothing
 N_LEVELS = 50  # of s, at which two directions are compared
-WAITS = 4  # longest flights between two arc hits, which captures and releases are told late by, and lags
+# Longest flights between two arc hits, which captures and releases are told late by, and lags.
+WAITS = 4
 N_LOOKED_AT = 20_000  # particles
 NEARER = 1 / 3  # of theory's distance, that a rival may have
 CLOSE = 0.02  # distance that no chance explains, but that a rival's own error may
@@ -79,11 +80,13 @@ class GivenEnsemble(NamedTuple):
         energy: of every start, v^2 / 2 in the scene's units.
         s: (n,) log E1 / E0.
         captured: (n,) which were captured; None where nothing tells.
-        t_in, t_out: (n,) ends of the capture interval [scene's time]; nan for none; None where not given.
+        t_in, t_out: (n,) ends of the capture interval [scene's time]; nan for none; None where not
+            given.
         x0, y0: (n,) where each started; None where not given.
         n_lost: rows without an energy, or particles without a row.
         is_binary32: whether every energy is a number of 24 bits.
-        later: (n, K - 1) log E_k / E0 after the second of K cycles and each that follows; None for one cycle.
+        later: (n, K - 1) log E_k / E0 after the second of K cycles and each that follows; None for
+            one cycle.
     """
 
     scene: Mushroom
@@ -100,7 +103,10 @@ class GivenEnsemble(NamedTuple):
 
 
 class HighEnergies:
-    """The limit of high energies, by the names of `theory.FiniteEnergy`; what it leaves out is a guess."""
+    """The limit of high energies, by the names of `theory.FiniteEnergy`.
+
+    What it leaves out is a guess.
+    """
 
     def __init__(self, scene: Mushroom, energy: float) -> None:
         found = theory.predict(scene, 12)
@@ -129,7 +135,9 @@ class HighEnergies:
 
     def capture_cdf(self, t: FloatArray) -> FloatArray:
         """Return the distribution of the time of capture."""
-        return np.asarray(np.interp(t, self._edges[1:], self._captured / max(self._captured[-1], 1e-12)))
+        return np.asarray(
+            np.interp(t, self._edges[1:], self._captured / max(self._captured[-1], 1e-12))
+        )
 
 
 Theory = theory.FiniteEnergy | HighEnergies
@@ -173,7 +181,10 @@ def checks(given: GivenEnsemble, theirs: Theory) -> list[Check]:
 
 
 def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Theory) -> Check:
-    """Hold two directions of one cycle to p_rev(-s) = p(s) exp(-s): to the share below s, at its worst."""
+    """Compare two directions of one cycle by p_rev(-s) = p(s) exp(-s).
+
+    Compared is the share below s, where it differs most.
+    """
     here = _some(given.s)
     there = -_some(other.s)
     places = np.quantile(np.concatenate([here, there]), np.linspace(0.01, 0.99, N_LEVELS))
@@ -215,7 +226,10 @@ def _records(given: GivenEnsemble) -> Iterator[Check]:
 
 
 def _starts(given: GivenEnsemble) -> Iterator[Check]:
-    """Hold the starts to a uniform density in area, by how many are in the cap, and how far out there."""
+    """Compare the starts with a uniform density in area.
+
+    Compared are how many are in the cap, and how far out they are there.
+    """
     if given.x0 is None or given.y0 is None:
         return
     now = table_at(fp, given.scene, cycle_start(given.scene))
@@ -232,7 +246,14 @@ def _energies(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     left = theirs.theory_error
     rival = ("no growth", 0.0) if theirs.mean_s else None
     scale = max(abs(theirs.mean_s), left.mean_s) * 4
-    yield close("m1: mean of log E1/E0", mean(s), theirs.mean_s, band=left.mean_s, scale=scale, against=rival)
+    yield close(
+        "m1: mean of log E1/E0",
+        mean(s),
+        theirs.mean_s,
+        band=left.mean_s,
+        scale=scale,
+        against=rival,
+    )
     yield close(
         IDENTITY,
         mean(np.exp(-s)),
@@ -242,7 +263,9 @@ def _energies(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     )
     if isinstance(theirs, theory.FiniteEnergy):
         mirrored = ("the wrong sign of every gain", lambda x: 1 - theirs.cdf(-np.asarray(x)))
-        yield fits("log E1/E0", _some(s), theirs.cdf, band=peak_band(theirs), scale=0.3, against=mirrored)
+        yield fits(
+            "log E1/E0", _some(s), theirs.cdf, band=peak_band(theirs), scale=0.3, against=mirrored
+        )
 
 
 def _captures(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
@@ -269,7 +292,9 @@ def _captures(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
         yield close("width of their peak", spread(free), sigma, band=sigma * left.variance / 2)
         yield fits(FREE, _some(free), theirs.free_cdf, band=band, scale=0.4)
     if len(caught) >= FEW and theirs.p_nc < 1:
-        band += left.captured_mean * steepest(theirs.captured_cdf, *np.quantile(caught, (0.001, 0.999)))
+        band += left.captured_mean * steepest(
+            theirs.captured_cdf, *np.quantile(caught, (0.001, 0.999))
+        )
         yield fits(CAPTURED, _some(caught), theirs.captured_cdf, band=band, scale=0.4)
 
 
@@ -288,7 +313,9 @@ def _capture_intervals(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     end = _some(given.t_out)
     both = np.isfinite(begin) & np.isfinite(end)
     rate = N_TIMES / given.scene.period
-    steepest = rate * float(np.max(np.abs(np.diff(nu_at(given.scene, np.arange(N_TIMES + 1) / rate)))))
+    steepest = rate * float(
+        np.max(np.abs(np.diff(nu_at(given.scene, np.arange(N_TIMES + 1) / rate))))
+    )
     yield close(
         RELEASE,
         mean(nu_at(given.scene, end[both]) - nu_at(given.scene, begin[both])),
@@ -298,7 +325,10 @@ def _capture_intervals(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
 
 
 def _later(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
-    """Hold log E_k/E0 after each further cycle to sums of k cycles, drawn from theory where it has rates."""
+    """Compare log E_k/E0 after each further cycle with sums of k cycles.
+
+    They are drawn from theory where it has rates.
+    """
     if given.later is None:
         return
     n_cycles = 1 + given.later.shape[1]
@@ -323,7 +353,7 @@ def _some(values: FloatArray, most: int = MOST_SORTED) -> FloatArray:
 
 
 class Rival(NamedTuple):
-    """A mistake: what is said of it, what undoes it in s, and the distribution that is then left."""
+    """A mistake: what is said of it, what undoes it in s, and the distribution then left."""
 
     said: str
     cdf: Cdf
@@ -331,14 +361,20 @@ class Rival(NamedTuple):
 
 
 def likely_causes(given: GivenEnsemble, theirs: Theory, found: list[Check]) -> list[str]:
-    """Say what is likely wrong, a line each; nothing where every check holds or nothing known fits."""
+    """Say what is likely wrong, a line each.
+
+    Nothing where every check holds or nothing known fits.
+    """
     wrong = {check.what for check in found if check.holds is False}
     if not wrong:
         return []
     records = list(_told_by_records(given, theirs))
     end = _common_end(given)
     if end is not None:
-        return [*records, f"many captures end together at {end:.3f} of the cycle: it was followed no further"]
+        return [
+            *records,
+            f"many captures end together at {end:.3f} of the cycle: it was followed no further",
+        ]
     told = [*records, *_told_by_captures(given, theirs, wrong)]
     s = _some(given.s, N_LOOKED_AT)
     distance = gap(s, theirs.cdf)
@@ -369,7 +405,10 @@ def _told_by_records(given: GivenEnsemble, theirs: Theory) -> Iterator[str]:
     if given.n_lost > MAX_LOST * n:
         lost = given.n_lost / n
         yield f"{lost:.1%} of the particles are missing: no figure is judged without them"
-        if given.captured is not None and abs(lost - (1 - theirs.p_nc)) < 3 * (0.25 / n) ** 0.5 + 0.01:
+        if (
+            given.captured is not None
+            and abs(lost - (1 - theirs.p_nc)) < 3 * (0.25 / n) ** 0.5 + 0.01
+        ):
             share = f"{1 - theirs.p_nc:.1%}"
             yield f"as many are missing as theory has captured, {share}: captured ones were dropped"
     if given.captured is not None and not given.captured.any() and theirs.p_nc < 1:
@@ -377,7 +416,7 @@ def _told_by_records(given: GivenEnsemble, theirs: Theory) -> Iterator[str]:
 
 
 def _common_end(given: GivenEnsemble) -> float | None:
-    """Return the part of the cycle after which no capture interval goes on, if many last until then."""
+    """Return the part of the cycle where many capture intervals end and none goes on."""
     if given.t_out is None or not np.isfinite(given.t_out).any():
         return None
     ends = (given.t_out - cycle_start(given.scene)) / given.scene.period
@@ -394,7 +433,8 @@ def _told_by_captures(given: GivenEnsemble, theirs: Theory, wrong: set[str]) -> 
         drop = np.nanmean(nu_at(given.scene, given.t_out) - nu_at(given.scene, given.t_in))
         how = "before" if drop < 0 else "after"
         yield (
-            f"captured particles are let out {how} the mouth is as wide as when they were caught (nu by"
+            f"captured particles are let out {how} the mouth is as wide as when they were caught"
+            " (nu by"
             f" {abs(drop):.3f}): the mouth's edge leaks, or base and arc do not keep the angle"
         )
     elif SHARE in wrong:
@@ -402,8 +442,10 @@ def _told_by_captures(given: GivenEnsemble, theirs: Theory, wrong: set[str]) -> 
         few = "few" if share < 1 - theirs.p_nc else "many"
         more = "; or starts are not uniform"
         yield (
-            f"too {few} are captured, {share:.1%} for {1 - theirs.p_nc:.1%}: the mouth is not as wide as its"
-            f" law says, as where its corners leak{more if wrong.isdisjoint((TIMES, CAPTURED)) else ''}"
+            f"too {few} are captured, {share:.1%} for {1 - theirs.p_nc:.1%}: the mouth is not as"
+            " wide as its"
+            " law says, as where its corners"
+            f" leak{more if wrong.isdisjoint((TIMES, CAPTURED)) else ''}"
         )
 
 
@@ -416,13 +458,16 @@ def _rivals(given: GivenEnsemble, theirs: Theory, right_groups: bool) -> Iterato
         "a logarithm to base 10 is given": lambda s: s * np.log(10),
     }
     yield from (Rival(said, theirs.cdf, undoing) for said, undoing in undo.items())
-    yield Rival("only the never captured are there: captured particles were dropped", theirs.free_cdf)
+    yield Rival(
+        "only the never captured are there: captured particles were dropped", theirs.free_cdf
+    )
     if theirs.p_nc < 1:
         yield Rival("only the captured are there", theirs.captured_cdf)
     if theirs.p_nc < 1 and (given.captured is None or (given.captured.any() and right_groups)):
         p = _share_of_the_free(given, theirs)
         yield Rival(
-            f"never captured {p:.1%}, where theory has {theirs.p_nc:.1%}, both with the right energies:"
+            f"never captured {p:.1%}, where theory has {theirs.p_nc:.1%}, both with the right"
+            " energies:"
             " starts are not uniform in area and direction, or a share of one group is lost",
             lambda s: p * theirs.free_cdf(s) + (1 - p) * theirs.captured_cdf(s),
         )

@@ -108,12 +108,17 @@ def _finding(claim: Claim, finding: Finding) -> Data:
 
 
 def _check(check: Check) -> Data:
-    numbers = {name: _number(getattr(check, name)) for name in ("value", "error", "band", "sees", "power")}
+    numbers = {
+        name: _number(getattr(check, name)) for name in ("value", "error", "band", "sees", "power")
+    }
     return check._asdict() | numbers | {"pull": pull(check)}
 
 
 def pull(check: Check) -> float | None:
-    """Return how many standard errors a value is from the number expected; None where nothing is random."""
+    """Return how many standard errors a value is from the number expected.
+
+    None where nothing is random.
+    """
     if check.value is None or not check.error:
         return None
     try:
@@ -192,9 +197,9 @@ def to_html(data: Data, samples: figures.Samples) -> str:
 def headline(samples: figures.Samples) -> list[Data]:
     """Return the first screen: the paper's main numbers as printed, as predicted and as simulated.
 
-    `theory_there` is the limit of infinite energy as printed, `limit` the same by our theory. `predicted` is
-    by our theory at the run's energy with nothing fitted, `found` by our simulation. `pull` is found less
-    predicted, in standard errors.
+    `theory_there` is the limit of infinite energy as printed, `limit` the same by our theory.
+    `predicted` is by our theory at the run's energy with nothing fitted, `found` by our simulation.
+    `pull` is found less predicted, in standard errors.
     """
     rows = []
     for run, quantity, simulated_there, theory_there in MAIN:
@@ -226,7 +231,7 @@ def headline(samples: figures.Samples) -> list[Data]:
 
 
 def _place(finding: Data) -> tuple[list[int], str, int]:
-    """Return where in the paper a finding belongs: its first section, then its letter and number."""
+    """Return where in the paper a finding belongs: first section, then letter and number."""
     sections = re.findall(r"sec[s]?\. (\d(?:\.\d)*)", finding["where"])
     first = [int(part) for part in sections[0].split(".")] if sections else [9]
     return first, finding["id"][0], int(finding["id"][1:])
@@ -252,7 +257,7 @@ def expected_text(check: Data) -> str:
 
 
 def power_text(check: Data) -> str:
-    """Return what a check is worth: the smallest departure seen, and its named alternative's chances."""
+    """Return what a check is worth: the smallest departure seen, and its rival's chances."""
     seen = "" if check["sees"] is None else f"{check['sees']:.1g}"
     if check["power"] is None:
         return seen
@@ -269,15 +274,20 @@ def to_text(data: Data) -> str:
     """Return the summary: one line per claim, then what did not come out as expected."""
     lines = []
     for finding in data["findings"]:
-        n_held = sum(check["holds"] is True for check in finding["checks"] if check["form"] != "printed")
+        n_held = sum(
+            check["holds"] is True for check in finding["checks"] if check["form"] != "printed"
+        )
         n = sum(check["form"] != "printed" for check in finding["checks"])
         mark = " " if finding["as_expected"] else "!"
-        lines.append(f"{mark} {finding['id']:<4}{finding['verdict']:<28}{n_held:>3}/{n:<4}{finding['where']}")
+        lines.append(
+            f"{mark} {finding['id']:<4}{finding['verdict']:<28}{n_held:>3}/{n:<4}{finding['where']}"
+        )
         if not finding["as_expected"]:
             lines.append(f"      expected: {finding['expected']}")
             # Each check that does not come out as its form asks: what is printed must fail.
             lines += [
-                f"      {check['form']}: {check['what']}: {figures_text(check)}, expected {check['expected']}"
+                f"      {check['form']}: {check['what']}: {figures_text(check)}, expected"
+                f" {check['expected']}"
                 for check in finding["checks"]
                 if (check["holds"] is not True) != (check["form"] == "printed")
             ]
@@ -286,7 +296,8 @@ def to_text(data: Data) -> str:
     lines += [
         "",
         f"{n_right} of {len(data['findings'])} claims have their expected verdict."
-        f" {alarms['tests']} comparisons with random data at {alarms['standard_errors']:.2f} standard errors:"
+        f" {alarms['tests']} comparisons with random data at {alarms['standard_errors']:.2f}"
+        " standard errors:"
         f" a false alarm in fewer than {alarms['bound']:.1e} of audits.",
     ]
     return "\n".join(lines) + "\n"

@@ -1,7 +1,7 @@
 """The style of every plot: one palette, new figures, the same bytes for the same picture.
 
-The palette is Okabe and Ito's, told apart by colour-blind readers, and viridis for phases. Simulation is
-blue and filled, theory orange or black lines.
+The palette is Okabe and Ito's, told apart by colour-blind readers, and viridis for phases.
+Simulation is blue and filled, theory orange or black lines.
 """
 
 import io
@@ -47,11 +47,13 @@ def phase_colours(n: int) -> list[str]:
 
 
 def plain(text: str) -> str:
-    """Return a text that a figure shows as it is: a dollar in it begins no formula, and lines have an end.
+    """Return a text that a figure shows as it is: a dollar begins no formula, and lines end.
 
     A picture is made as wide as its title: the names of scenes may have any length.
     """
-    lines = (line if len(line) <= LONGEST else line[: LONGEST - 1] + "…" for line in text.splitlines())
+    lines = (
+        line if len(line) <= LONGEST else line[: LONGEST - 1] + "…" for line in text.splitlines()
+    )
     return "\n".join(islice(lines, MOST_LINES)).replace("$", r"\$")
 
 
@@ -77,7 +79,7 @@ class NotebookFigure(Figure):
 def new_figure(
     width: float, height: float, n_rows: int = 1, n_columns: int = 1, **options: Any
 ) -> tuple[Figure, Any]:
-    """Return a figure [inches] and its axes (an array when there are several), as `Figure.subplots` does."""
+    """Return a figure [inches] and its axes, as `Figure.subplots` does."""
     figure = NotebookFigure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure, figure.subplots(n_rows, n_columns, **options)
@@ -100,9 +102,16 @@ def save(figure: Figure, file: BinaryIO, suffix: str, dpi: int = 160) -> None:
 
 
 def svg(figure: Figure) -> bytes:
-    """Return a figure as a small SVG for a page: letters as text, coordinates to a hundredth of a point."""
+    """Return a figure as a small SVG for a page.
+
+    Letters are text. Coordinates have a hundredth of a point.
+    """
     file = io.BytesIO()
     with rc_context({"svg.fonttype": "none"}):
         save(figure, file, ".svg", dpi=110)
-    text = re.sub(rb'<!--.*?-->|(?<=<g) id="[^"]*"| transform="rotate\(-0 [^"]*"', b"", file.getvalue())
-    return re.sub(rb"(\.\d\d)\d+(?=[^<>]*>)", rb"\1", text)  # within tags: numbers that are read stay
+    text = re.sub(
+        rb'<!--.*?-->|(?<=<g) id="[^"]*"| transform="rotate\(-0 [^"]*"', b"", file.getvalue()
+    )
+    return re.sub(
+        rb"(\.\d\d)\d+(?=[^<>]*>)", rb"\1", text
+    )  # within tags: numbers that are read stay

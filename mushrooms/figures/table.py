@@ -1,4 +1,4 @@
-"""Pictures of a table: its walls through the cycle, a few chords of one trajectory, an animation."""
+"""Pictures of a table: walls through the cycle, a few chords of one trajectory, an animation."""
 
 from __future__ import annotations
 
@@ -85,7 +85,9 @@ def new_strip(scene: Scene, width: float, max_height: float) -> Figure:
         return n_rows * (0.85 * width * n_rows / len(times) * ratio + 0.6)
 
     n_rows = 2 if len(times) > 1 and height(2) <= max_height else 1
-    figure, grid = plots.new_figure(width, min(height(n_rows), max_height), n_rows, len(times) // n_rows)
+    figure, grid = plots.new_figure(
+        width, min(height(n_rows), max_height), n_rows, len(times) // n_rows
+    )
     for k, (axes, t, colour) in enumerate(
         zip(np.ravel(grid), times, plots.phase_colours(len(times)), strict=True)
     ):
@@ -97,12 +99,15 @@ def new_strip(scene: Scene, width: float, max_height: float) -> Figure:
     return figure
 
 
-def write_picture(scene: Scene, suffix: str, file: BinaryIO, progress: Progress | None = None) -> None:
+def write_picture(
+    scene: Scene, suffix: str, file: BinaryIO, progress: Progress | None = None
+) -> None:
     """Write a picture of the scene.
 
     Args:
         scene: any valid table.
-        suffix: ".svg", ".png" or ".pdf": the table at each phase, with chords; ".gif": the walls in motion.
+        suffix: ".svg", ".png" or ".pdf": the table at each phase, with chords; ".gif": the walls in
+            motion.
         file: open for binary writing.
         progress: see `write_frames`.
     """
@@ -116,7 +121,9 @@ def write_picture(scene: Scene, suffix: str, file: BinaryIO, progress: Progress 
     axes = new_slide(scene)
 
     def show(k: int) -> None:
-        axes.set_title(f"{name}   " + (f"t/T = {times[k] / scene.period:.2f}" if scene.period else "static"))
+        axes.set_title(
+            f"{name}   " + (f"t/T = {times[k] / scene.period:.2f}" if scene.period else "static")
+        )
 
     write_frames(scene, axes, times, show, file, progress)
 
@@ -181,4 +188,10 @@ def _frame(scene: Scene) -> tuple[float, float, float, float]:
 
 def _set_frame(axes: Axes, scene: Scene) -> None:
     left, right, bottom, top = _frame(scene)
-    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel="x [length]", ylabel="y [length]")
+    axes.set(
+        xlim=(left, right),
+        ylim=(bottom, top),
+        aspect="equal",
+        xlabel="x [length]",
+        ylabel="y [length]",
+    )

@@ -1,4 +1,4 @@
-"""The paper's experiments, measured in our simulations and held against theory: X1 to X8, X4 apart."""
+"""The paper's experiments, measured in our simulations, compared with theory: X1 to X8 but X4."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -49,7 +49,10 @@ TROUGH = 0.2  # of the density of s, between its modes
 
 
 def chord_time(sample: Sample) -> float:
-    """Return the longest time from one arc hit to the next: capture and release are seen at arc hits."""
+    """Return the longest time from one arc hit to the next.
+
+    Capture and release are seen at arc hits.
+    """
     return 2 * float(bounds(laws(scene_of(sample.run))["r"]).highest) / sample.speed
 
 
@@ -57,29 +60,47 @@ def growth(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the mean of s with m1 and its finite-energy bias."""
     theirs = float(evidence.theory_of(sample).m1)
     return less_bias(
-        GROWTH, sample, theirs, scale=abs(theirs) or np.inf, against=(("no growth", 0.0) if theirs else None)
+        GROWTH,
+        sample,
+        theirs,
+        scale=abs(theirs) or np.inf,
+        against=(("no growth", 0.0) if theirs else None),
     )
 
 
 def escape(evidence: ClaimEvidence, sample: Sample) -> Check:
-    """Compare the uncaptured share with p_nc: particles that lag are captured more or less likely."""
-    theirs, s_nc = (float(getattr(evidence.theory_of(sample), name)) for name in ("p_nc", "log_e_nc"))
+    """Compare the uncaptured share with p_nc.
+
+    Particles that lag are captured more or less likely.
+    """
+    theirs, s_nc = (
+        float(getattr(evidence.theory_of(sample), name)) for name in ("p_nc", "log_e_nc")
+    )
     return less_bias(
         ESCAPE,
         sample,
         theirs,
         scale=0.1,
         against=(
-            ("that of the reversed cycle", theirs * np.exp(-s_nc)) if s_nc else ("nobody is captured", 1.0)
+            ("that of the reversed cycle", theirs * np.exp(-s_nc))
+            if s_nc
+            else ("nobody is captured", 1.0)
         ),
     )
 
 
 def peak_place(evidence: ClaimEvidence, sample: Sample) -> Check:
-    """Compare the mean energy of the uncaptured with log E_nc, less its drift and what others' lags add."""
+    """Compare the mean energy of the uncaptured with log E_nc.
+
+    Its drift, and what others' lags add, are taken off.
+    """
     theirs = float(evidence.theory_of(sample).log_e_nc)
     return less_bias(
-        PEAK, sample, theirs, scale=abs(theirs) or np.inf, against=("no bias", theirs - PEAK.bias(sample))
+        PEAK,
+        sample,
+        theirs,
+        scale=abs(theirs) or np.inf,
+        against=("no bias", theirs - PEAK.bias(sample)),
     )
 
 
@@ -91,7 +112,9 @@ def peak_shape(sample: Sample) -> Check:
     still = norm(found.s_nc, found.peak[1] ** 0.5).cdf
     note = f"of a Gaussian at log E_nc {chance(kept, still):.1g}"
     rival = ("a Gaussian at log E_nc", still)
-    return fits(what, kept, found.free_cdf, band=peak_band(found), scale=0.2, note=note, against=rival)
+    return fits(
+        what, kept, found.free_cdf, band=peak_band(found), scale=0.2, note=note, against=rival
+    )
 
 
 def peak_width(sample: Sample) -> Check:
@@ -113,7 +136,9 @@ def captured_energies(sample: Sample) -> Check:
     sharp, found = adiabatic(sample).captured_cdf, predicted(sample).captured_cdf
     note = f"of the adiabatic theory {chance(values, sharp):.1g}"
     rival = ("no blur", sharp)
-    return fits(what, values, found, band=captured_band(sample), scale=0.2, note=note, against=rival)
+    return fits(
+        what, values, found, band=captured_band(sample), scale=0.2, note=note, against=rival
+    )
 
 
 def one_cycle(evidence: ClaimEvidence, runs: tuple[str, ...]) -> Iterator[Check]:
@@ -137,7 +162,10 @@ def moving_cap(evidence: ClaimEvidence) -> Iterator[Check]:
         *one_cycle(evidence, MOVING),
         close(
             "share never captured at 1e7 against the paper's 38.78 %",
-            (share(high.never_captured).value, float(np.hypot(share(high.never_captured).error, 0.00308))),
+            (
+                share(high.never_captured).value,
+                float(np.hypot(share(high.never_captured).error, 0.00308)),
+            ),
             0.3878,
             band=5e-5,
         ),
@@ -149,11 +177,17 @@ def moving_cap(evidence: ClaimEvidence) -> Iterator[Check]:
 
 
 def _modes(sample: Sample) -> Iterator[Check]:
-    """Look for the fullest bin on either side of the trough among those that theory may have the fullest."""
+    """Look for the fullest bin on either side of the trough.
+
+    Looked at are those that theory may have the fullest.
+    """
     counts = np.histogram(sample.gain, MODE_BINS)[0]
     expected = np.diff(predicted(sample).cdf(MODE_BINS)) * sample.n
     middle = (MODE_BINS[1:] + MODE_BINS[:-1]) / 2
-    for side, name in ((middle < TROUGH, "the left, of the uncaptured"), (middle >= TROUGH, "the right")):
+    for side, name in (
+        (middle < TROUGH, "the left, of the uncaptured"),
+        (middle >= TROUGH, "the right"),
+    ):
         top = expected[side].max()
         likely = middle[side & (expected >= top - N_SIGMA * (2 * top) ** 0.5)]
         found = float(middle[side][np.argmax(counts[side])])
@@ -191,9 +225,16 @@ def ergodic(evidence: ClaimEvidence) -> list[Check]:
     ratio = (found.peak[1] / predicted(earlier).peak[1]) ** 0.5
     return [
         less_bias(GROWTH, sample, 0.0, start=""),
-        fits("one peak, as predicted", sample.gain, found.free_cdf, band=peak_band(found), scale=0.2),
+        fits(
+            "one peak, as predicted", sample.gain, found.free_cdf, band=peak_band(found), scale=0.2
+        ),
         close("mean of E0/E1", mean(np.exp(-sample.gain)), found.mean_of_exp(-1), band=left.mean_s),
-        stated("nobody is captured", not sample.captured.any(), f"{sample.captured.sum()} captured", "0"),
+        stated(
+            "nobody is captured",
+            not sample.captured.any(),
+            f"{sample.captured.sum()} captured",
+            "0",
+        ),
         close(
             "its width shrinks as E0^(-1/4) from 1e6: ratio",
             spread(sample.gain).over(spread(earlier.gain)),
@@ -256,7 +297,8 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
         "retraced-arc@1e6: share captured in both of its windows",
         share(twice),
         (1 - float(theirs.p_nc) ** 0.5) ** 2,
-        band=predicted(retraced).theory_error.p_nc + abs(predicted(retraced).p_nc - float(theirs.p_nc)),
+        band=predicted(retraced).theory_error.p_nc
+        + abs(predicted(retraced).p_nc - float(theirs.p_nc)),
     )
     for parameter in ("radius", "depth", "mouth", "slope"):
         result = evidence.predict(SCENES[f"only-{parameter}"])

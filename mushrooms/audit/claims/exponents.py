@@ -1,7 +1,7 @@
 """Laws confirmed by measured exponents and through the cycle: L1 to L7.
 
-Exponents are fitted with the next order beside them, so that no band is needed for it. What is random carries
-its standard error, that of orbits drawn (L1, C6) too.
+Exponents are fitted with the next order beside them, so that no band is needed for it. What is
+random carries its standard error, that of orbits drawn (L1, C6) too.
 """
 
 from __future__ import annotations
@@ -30,7 +30,16 @@ from mushrooms.audit.claims.finite_energy import (
     zone_energy,
 )
 from mushrooms.audit.runs import RUNS, Sample, run_seed, scene_of
-from mushrooms.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
+from mushrooms.audit.tolerances import (
+    BoolArray,
+    FloatArray,
+    Mean,
+    close,
+    mean,
+    share,
+    spread,
+    stated,
+)
 from scene import Scene, State, load
 from scene.geometry import area, table_at
 from scene.laws import bounds, values
@@ -90,7 +99,7 @@ def impact_angle(evidence: ClaimEvidence) -> list[Check]:
 
 @lru_cache(maxsize=1)  # L1 and C6 look at the same
 def _orbits(follow: Callable[..., Collisions], seed: int) -> dict[str, FloatArray]:
-    """Return what changes along drawn orbits, (N_ORBITS, len(SPEEDS)) each, by the names of `_orbit`."""
+    """Return what changes along drawn orbits, by the names of `_orbit`: (N_ORBITS, len(SPEEDS))."""
     scene = load("breathing-circle")
     random = np.random.default_rng(run_seed(seed, RUNS["frozen-mushroom@1e8"], -3))
     starts = random.uniform((-0.6, 0.1, 0.0), (0.6, 0.7, 2 * np.pi), size=(N_ORBITS, 3)).tolist()
@@ -138,7 +147,9 @@ def _orbit(
 
 def _orbits_exponent(what: str, rows: FloatArray, exponent: int) -> Check:
     """Compare the exponent of v with an expected one; its error is of the mean over orbits."""
-    fits = [theory.fit_power(SPEEDS, row, np.full(len(row), 0.1), (-1.0, -2.0)).exponent for row in rows]
+    fits = [
+        theory.fit_power(SPEEDS, row, np.full(len(row), 0.1), (-1.0, -2.0)).exponent for row in rows
+    ]
     return close(
         f"{what}: exponent of v, {len(rows)} orbits",
         mean(fits),
@@ -153,16 +164,25 @@ def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
     captured = evidence.samples(*LADDER[1:6])
     widths = [spread(cap_change(sample)) for sample in captured]
     yield _exponent(
-        "log(E V_cap) of captured particles, phase 7/16 to 9/16: spread against E0", captured, widths, -0.5
+        "log(E V_cap) of captured particles, phase 7/16 to 9/16: spread against E0",
+        captured,
+        widths,
+        -0.5,
     )
     high = captured[-2]
-    # E is seen since the last hit, half a chord before on average, in which log V_cap changes by 2 u/v.
+    # E is seen since the last hit, half a chord before on average, in which log V_cap changes by 2
+    # u/v.
     arc = bounds(laws(scene_of(high.run))["r"]).slope
-    yield close(f"{high.run.name}: its mean", mean(cap_change(high)), 0.0, band=2 * arc / high.speed)
+    yield close(
+        f"{high.run.name}: its mean", mean(cap_change(high)), 0.0, band=2 * arc / high.speed
+    )
     free = evidence.samples(*ERGODIC)
     changes = [sample.phase_s[:, 0, 3] + log_volume(sample, 0.5) for sample in free]
     yield _exponent(
-        "c = 0, log(E V) at half a cycle: spread against E0", free, [spread(c) for c in changes], -0.25
+        "c = 0, log(E V) at half a cycle: spread against E0",
+        free,
+        [spread(c) for c in changes],
+        -0.25,
     )
     found = predicted(free[-1])
     yield close(
@@ -175,7 +195,9 @@ def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def cap_change(sample: Sample) -> FloatArray:
     """Return the change of log(E V_cap) from phase 7/16 to 9/16 of those in the island at both."""
-    volumes = [theory.volumes_at(fp, scene_of(sample.run), 2 * fp.pi * k / 16).v_cap for k in (7, 9)]
+    volumes = [
+        theory.volumes_at(fp, scene_of(sample.run), 2 * fp.pi * k / 16).v_cap for k in (7, 9)
+    ]
     return captured_change(sample, 6, 8) + math.log(volumes[1] / volumes[0])
 
 
@@ -187,7 +209,10 @@ def log_volume(sample: Sample, phase: float) -> float:
 
 
 def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: float) -> Check:
-    """Compare the exponent of E0 with an expected one, the next order, ~ 1/v, being fitted beside it."""
+    """Compare the exponent of E0 with an expected one.
+
+    The next order, ~ 1/v, is fitted beside it.
+    """
     fit = fitted(samples, values, -0.5)
     energies = [sample.run.energy for sample in samples]
     return close(
@@ -201,7 +226,7 @@ def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: fl
 
 
 def volumes(evidence: ClaimEvidence) -> Iterator[Check]:
-    """L3: volumes as shares of random phase points, and of particles that stay in the frozen cap."""
+    """L3: volumes as shares of random phase points, and of particles that stay in a frozen cap."""
     n = N_POINTS[evidence.size]
     random = np.random.default_rng(run_seed(evidence.seed, RUNS["frozen-mushroom@1e8"], -1))
     scene = load("moving-cap")
@@ -212,7 +237,9 @@ def volumes(evidence: ClaimEvidence) -> Iterator[Check]:
         label = f"moving cap at {phase:g} of its cycle"
         yield from [
             close(f"{label}: V_cap / V", share(in_cap[inside]), now.v_cap / total),
-            close(f"{label}: V_ell / V_cap", share(in_island[inside & in_cap]), now.v_ell / now.v_cap),
+            close(
+                f"{label}: V_ell / V_cap", share(in_island[inside & in_cap]), now.v_ell / now.v_cap
+            ),
         ]
     for sample in evidence.samples("frozen-mushroom@1e8", "frozen-untilted@1e8"):
         still = theory.volumes_at(fp, scene_of(sample.run), 0.0)
@@ -265,15 +292,17 @@ def release(evidence: ClaimEvidence) -> list[Check]:
 def _largest_gap(sample: Sample) -> float:
     """Return a bound on |nu(t_out) - nu(t_in)| v for the moving cap, to the first order in 1/v.
 
-    Capture and release are each seen up to a chord late, 2 r/v, in which nu changes by its rate times that.
-    Meanwhile v r changes relatively by up to (1/v) (2 u + the integral of u^2/r): at each hit the radius has
-    moved by r'' dt^2 / 2 beyond what the speed lost, dt = 2 r cos(phi)/v; and sin(phi) = L/(v r) as much.
+    Capture and release are each seen up to a chord late, 2 r/v, in which nu changes by its rate
+    times that. Meanwhile v r changes relatively by up to (1/v) (2 u + the integral of u^2/r): at
+    each hit the radius has moved by r'' dt^2 / 2 beyond what the speed lost, dt = 2 r cos(phi)/v;
+    and sin(phi) = L/(v r) as much.
     """
     scene = scene_of(sample.run)
     arc = bounds(laws(scene)["r"])
     mouth = bounds(laws(scene)["nu"])
     return float(
-        2 * 2 * arc.highest * mouth.slope + (2 * arc.slope + scene.period * arc.slope**2 / arc.lowest)
+        2 * 2 * arc.highest * mouth.slope
+        + (2 * arc.slope + scene.period * arc.slope**2 / arc.lowest)
     )
 
 
@@ -304,7 +333,10 @@ def energy_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
 
 
 def _lag_at_capture(sample: Sample) -> Check:
-    """Compare log E of captured particles, which a cap at rest keeps, with what they had when captured."""
+    """Compare log E of captured particles with what they had when captured.
+
+    A cap at rest keeps it.
+    """
     found = predicted(sample)
     times = sample.first_capture[0]
     k = int(np.argmax(sample.phase_captured[:, 0].sum(axis=0)))
@@ -347,7 +379,9 @@ def population_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
                 (float(measured[k]), error),
                 p,
                 band=abs(p - float(earlier[k])) + left.p_nc,
-                against=("nobody is captured", 1.0) if p < 0.99 else ("nobody is released", expected.min()),
+                against=("nobody is captured", 1.0)
+                if p < 0.99
+                else ("nobody is released", expected.min()),
             )
 
 
@@ -370,7 +404,8 @@ def work(evidence: ClaimEvidence) -> Iterator[Check]:
         )
         ends = np.column_stack([done.phase_energies[:, 0], done.energy])[done.outcome == 0]
         n_lost += PER_ENERGY - len(ends)
-        # Energies are drawn at HOTTER times kT and weighted back: a few fast particles would carry the mean.
+        # Energies are drawn at HOTTER times kT and weighted back: a few fast particles would carry
+        # the mean.
         rows.append(np.mean(HOTTER * np.exp(energy / (HOTTER * KT) - ends / KT), axis=0))
     alike = math.exp(-evidence.predict("moving-cap").m1)
     for k, phase in enumerate((*phases, 1.0)):

@@ -1,6 +1,7 @@
 """What grows over cycles, and what does not: X4, C1, C9, D1 and C11 to C15.
 
-Sums of cycles are held against sums drawn from theory, and a Gaussian; cycles against their reverses.
+Sums of cycles are held against sums drawn from theory, and a Gaussian; cycles against their
+reverses.
 """
 
 from collections.abc import Iterator
@@ -40,7 +41,9 @@ from scene.transforms import backwards
 
 MANY = ("moving-cap@1e5x30", "moving-cap@1e7x30")
 INTEGRABLE = ("fermi-ulam@1e3x400", "breathing-circle@1e3x400")
-LARGEST = 0.1  # of |log E/E0|: a fortieth of what the moving cap gains in as many cycles in the mean
+LARGEST = (
+    0.1  # of |log E/E0|: a fortieth of what the moving cap gains in as many cycles in the mean
+)
 WITHOUT_FLUX = ("flux-free@1e6", "only-depth@1e6", "only-slope@1e6")
 GROWTH = 0.01  # of log E in a cycle, which would be seen
 N_PARTS = 3  # of the cycles, in each of which entropy is to grow
@@ -112,7 +115,8 @@ def _sum_of(sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
             band=N_SIGMA * mean(drawn**3).error,
         ),
         stated(
-            f"{label}: the tails are no Gaussian's, by theory", *_tails(scene_of(sample.run), n, cumulants)
+            f"{label}: the tails are no Gaussian's, by theory",
+            *_tails(scene_of(sample.run), n, cumulants),
         ),
     ]
 
@@ -152,15 +156,17 @@ def tails(evidence: ClaimEvidence) -> Iterator[Check]:
 def _told_from_a_gaussian(sample: Sample, n: int) -> Check:
     """Weigh log E_n/E0 between the theory's sums and a Gaussian of their mean and width.
 
-    The logarithm of the likelihoods' ratio tells two distributions apart better than any other number. After
-    more cycles, or slower ones that diffuse more, sums are too near a Gaussian for so many particles to tell.
+    The logarithm of the likelihoods' ratio tells two distributions apart better than any other
+    number. After more cycles, or slower ones that diffuse more, sums are too near a Gaussian for so
+    many particles to tell.
     """
     label = f"{sample.run.name}, n = {n}"
     sums = summed(sample.run.name, n)
     total, drawn = ((x - sums.mean) / sums.sd for x in (sample.s[:, n - 1], sums.values))
     edges = np.linspace(-3.5, 3.5, 29)
     counts, likely = (
-        np.bincount(np.searchsorted(edges, x), minlength=len(edges) + 1).astype(float) for x in (total, drawn)
+        np.bincount(np.searchsorted(edges, x), minlength=len(edges) + 1).astype(float)
+        for x in (total, drawn)
     )
     p = likely / likely.sum()
     q = np.diff(norm.cdf([-np.inf, *edges, np.inf]))
@@ -209,7 +215,8 @@ def independence(evidence: ClaimEvidence) -> Iterator[Check]:
         ratio = spread(sample.s[:, -1]).over(spread(sample.s[:, 0]))
         theirs = spread(drawn.sum(axis=1)).over(spread(drawn[:, 0]))
         yield close(
-            f"{run}: spread of log E_n/E0 over that of one cycle, sqrt(n) but for the first's wider blur",
+            f"{run}: spread of log E_n/E0 over that of one cycle, sqrt(n) but for the first's wider"
+            " blur",
             ratio,
             theirs.value,
             band=N_SIGMA * theirs.error,
@@ -232,7 +239,10 @@ def losses(evidence: ClaimEvidence) -> Iterator[Check]:
     one = theory.rarity(scene)
     other = theory.rarity(theory.reversed_cycle(scene))
     yield exact(
-        "P(E_n < E0) falls as exp(-n I), and so does the reverse's: I by theory", other.rate, one.rate, 1e-14
+        "P(E_n < E0) falls as exp(-n I), and so does the reverse's: I by theory",
+        other.rate,
+        one.rate,
+        1e-14,
     )
     for sample in evidence.samples(*MANY):
         for n in sorted({1, 10, sample.run.n_cycles}):
@@ -275,7 +285,9 @@ def without_flux(evidence: ClaimEvidence) -> Iterator[Check]:
     for sample in evidence.samples(*WITHOUT_FLUX):
         yield from _no_growth(sample)
         n = int(sample.captured.sum())
-        yield stated(f"{sample.run.name}: captured on the way", n == 0, f"{n} of {sample.n}", "nobody")
+        yield stated(
+            f"{sample.run.name}: captured on the way", n == 0, f"{n} of {sample.n}", "nobody"
+        )
 
 
 def radius_alone(evidence: ClaimEvidence) -> list[Check]:
@@ -284,11 +296,16 @@ def radius_alone(evidence: ClaimEvidence) -> list[Check]:
 
 
 def _no_growth(sample: Sample) -> list[Check]:
-    """Hold theory to m1 = 0, and particles to a mean of exp(-s/2) that finite energy does not bias."""
+    """Check that theory has m1 = 0, and particles a mean of exp(-s/2).
+
+    Finite energy does not bias that mean.
+    """
     limit = theory.predict(scene_of(sample.run))
     kept = np.exp(-sample.gain[sample.takes_part] / 2)
     return [
-        stated(f"{sample.run.name}: theory", limit.m1 == 0, f"m1 = {float(limit.m1):.1g}", "m1 = 0"),
+        stated(
+            f"{sample.run.name}: theory", limit.m1 == 0, f"m1 = {float(limit.m1):.1g}", "m1 = 0"
+        ),
         close(
             f"{sample.run.name}: mean of exp(-s/2), which finite energy leaves at 1",
             mean(kept),
@@ -329,7 +346,8 @@ def reversal(evidence: ClaimEvidence) -> list[Check]:
     bound = float(chi2.isf(LEVEL, n_bins))
     return [
         Check(
-            f"moving cap and its reverse at {REVERSED_ENERGY:g}: chi square of {n_bins} bins of (E0, E1)",
+            f"moving cap and its reverse at {REVERSED_ENERGY:g}: chi square of {n_bins} bins of"
+            " (E0, E1)",
             statistic <= bound,
             f"<= {bound:.4g}",
             statistic,
@@ -344,12 +362,14 @@ def reversal(evidence: ClaimEvidence) -> list[Check]:
 def _energies(
     evidence: ClaimEvidence, scene: Scene, n: int, low: float, high: float, stream: int
 ) -> FloatArray:
-    """Return E0 and E1, (2, n), of particles that start with all energies from low to high alike."""
+    """Return E0 and E1, (2, n), of particles whose start energies are uniform from low to high."""
     random = np.random.default_rng(run_seed(evidence.seed, RUNS["moving-cap@1e3"], stream))
     speeds = np.sqrt(2 * random.uniform(low, high, n)).tolist()
     states = [
         State(one.t, one.x, one.y, v * one.vx, v * one.vy)
-        for one, v in zip(profiles.microcanonical_states(scene, n, 0.5, random), speeds, strict=True)
+        for one, v in zip(
+            profiles.microcanonical_states(scene, n, 0.5, random), speeds, strict=True
+        )
     ]
     done = evidence.steppers.flow(scene, states, scene.period, evidence.threads)
     ends = [one.vx**2 + one.vy**2 if isinstance(one, Horizon) else np.nan for one in done.outcomes]

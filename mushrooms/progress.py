@@ -33,6 +33,8 @@ def announce_compilation() -> Iterator[None]:
     """
     from numba.core import event
 
+    from fast.kernel.numba_internals import cache_folder
+
     announced = set()
 
     class Announcer(event.Listener):  # type: ignore[misc]  # numba has no types
@@ -43,7 +45,7 @@ def announce_compilation() -> Iterator[None]:
             if is_ours and duration is not None and duration not in announced:
                 announced.add(duration)
                 what = f"compiling the fast stepper for this machine: {duration}"
-                is_kept = bool(compiled.stats.cache_path)
+                is_kept = cache_folder(compiled) is not None
                 next_time = (
                     "kept for next time" if is_kept else "no folder can be written in to keep it"
                 )

@@ -20,6 +20,7 @@ from reference.isolation import Isolator
 from reference.walls import MovingWalls
 from scene import Cap, Mushroom, Scene, State, Stem, Undefined, Wall
 from scene.laws import bounds
+from scene.mpmath_internals import ends
 from scene.tables import laws
 
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
@@ -304,7 +305,7 @@ class Course:
         turn, motion = self.motion.timeline.turn, self.motion.at_rest(s)
         if turn is None:
             return False
-        place = wall, motion.flight.x._mpi_, motion.flight.y._mpi_
+        place = wall, ends(motion.flight.x), ends(motion.flight.y)
         if place not in self._never_met:
             arithmetic, start = self.arithmetic, self.arithmetic.zero
             jet, before = partial(motion.wall, wall), arithmetic.number(-1)

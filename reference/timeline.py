@@ -26,6 +26,7 @@ from reference.arithmetic import Arithmetic, Interval, exact_ends, is_below, sig
 from reference.jets import Jet, united
 from scene import BangBang, Fourier, Law, Scene
 from scene.laws import Quadratic, breakpoints, is_constant, leg_at
+from scene.mpmath_internals import ends
 from scene.tables import laws, period
 
 ORDER = 8
@@ -53,7 +54,7 @@ class Timeline:
 
     def jet(self, name: str, s: Interval) -> Jet:
         """Enclose a law and its derivatives at every time within s."""
-        key = name, s._mpi_
+        key = name, ends(s)
         if key in self._known:
             self._arithmetic.spend(1)
         else:

@@ -17,6 +17,7 @@ from reference.arithmetic import Arithmetic, Interval
 from reference.jets import Jet, add, multiply, negative, square
 from reference.timeline import Timeline
 from scene import Scene, Stem, Wall
+from scene.mpmath_internals import ends
 
 
 class EnclosedFlight(NamedTuple):
@@ -95,7 +96,7 @@ class MovingWalls:
 
     def wall(self, wall: Wall, s: Interval) -> Jet:
         """Enclose f, f', f'' of a wall over flight times s."""
-        key = wall, s._mpi_
+        key = wall, ends(s)
         if key in self._known:
             self.arithmetic.spend(1)
         else:

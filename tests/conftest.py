@@ -11,7 +11,6 @@ import json
 import os
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
@@ -23,6 +22,7 @@ from support.entries import kept_entries
 import fast
 from conformance.suite import run as suite
 from conformance.vectors import Vector, load
+from fast.kernel.numba_internals import cache_folder
 from fast.prepared import prepare
 from mushrooms.main import run
 from scene import Scene
@@ -98,7 +98,9 @@ def _compiled_once() -> None:
 
     def one_at_a_time(entry: Dispatcher) -> Callable[[Any], Any]:
         compile_or_load, name = entry.compile, entry.py_func.__qualname__
-        lock = Path(entry.stats.cache_path) / f"{name}.lock"
+        folder = cache_folder(entry)
+        assert folder is not None
+        lock = folder / f"{name}.lock"
 
         def compile_alone(signature: Any) -> Any:
             lock.parent.mkdir(parents=True, exist_ok=True)

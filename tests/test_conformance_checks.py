@@ -204,6 +204,44 @@ def test_a_hit_to_which_no_flight_led_is_named_by_its_flaw(changes, said):
 
 
 @pytest.mark.parametrize("profile", ["step", "trajectory", "flow"])
+def test_states_are_asked_about_up_to_a_time_that_is_near(profile):
+    """At once or soon after; a trajectory has time to go on. A start that is late is so by its own time."""
+    ahead = set()
+    for _, asked, why in bad_input.bad_states(Draw("states"), profile):
+        starts = asked["states"] if profile == "flow" else [asked["state"]]
+        late = {round(start["t"] - asked["t_end"], 12) for start in starts}
+        if "begins after" in why:
+            assert late == {1.0}
+        else:
+            ahead |= late
+            assert all(0.0 <= start["t"] < 3.0 for start in starts)
+    assert ahead == {-1.0} if profile == "trajectory" else {0.0, -(2.0**-6)}
+
+
+TAGGED = {"type": "object", "properties": {"kind": {"enum": ["wave"]}, "x": {"type": "number"}}}
+TWICE = {"type": "object", "properties": {"kind": {"enum": ["wave"]}, "wall": {"enum": ["arc"]}}}
+FORMS: list[tuple[dict[str, Any], Any, bool]] = [
+    ({"type": "null"}, None, True), ({"type": "null"}, 1.0, False), ({"type": "number"}, None, False),
+    ({"type": "boolean"}, True, True), ({"type": "integer"}, True, False), ({"type": "number"}, True, False),
+    ({"type": "integer"}, 1, True), ({"type": "number"}, 1, True), ({"type": "integer"}, 1.0, False),
+    ({"type": "number"}, 1.0, True), ({"type": "string"}, "1.0", True), ({"type": "number"}, "1.0", False),
+    ({"enum": ["arc"]}, "arc", True), ({"enum": ["arc"]}, 1.0, False), ({"type": "array"}, [1.0], True),
+    ({"type": "array"}, (1.0,), True), ({"type": "object"}, [1.0], False), ({"type": "array"}, {}, False),
+    ({"type": ["number", "null"]}, None, True), ({"type": ["number", "null"]}, "x", False),
+    ({"type": "object"}, {}, True), (TAGGED, {"kind": "wave"}, True), (TAGGED, {"kind": "legs"}, False),
+    (TAGGED, {"x": 1.0}, True), (TAGGED, 1.0, False), ({}, 1.0, False),
+    (TWICE, {"kind": "wave", "wall": "arc"}, True), (TWICE, {"kind": "wave", "wall": "no"}, False),
+    (TWICE, {"kind": "no", "wall": "arc"}, False),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("form", "value", "is_meant"), FORMS, ids=range(len(FORMS)))
+def test_a_form_of_the_schema_is_meant_by_values_of_its_type_and_tag(form, value, is_meant):
+    """A whole number is a number too; an object whose tag is missing may be of any form."""
+    assert bad_input._fits(form, value) is is_meant
+
+
+@pytest.mark.parametrize("profile", ["step", "trajectory", "flow"])
 def test_bad_states_are_bad_for_what_is_said_alone(profile):
     """Only a start that is late on purpose is asked about up to an earlier time."""
     for scene, asked, why in bad_input.bad_states(Draw("states"), profile):

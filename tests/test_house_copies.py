@@ -42,6 +42,7 @@ from mushrooms import lyapunov, orbits
 from mushrooms.figures import energies
 from mushrooms.interrupts import Interrupt
 from scene import geometry
+from scene.mpmath_internals import ends
 
 API = Path(__file__).parent.parent / "docs" / "api"
 PACKAGES = (scene, reference, fast, theory, conformance, mushrooms)
@@ -238,7 +239,7 @@ def error(kind):
 def number_token(number: Any) -> str | None:
     """Describe a number of many digits exactly; None for anything else."""
     if hasattr(number, "_mpi_"):
-        return "interval of " + " to ".join(str(tuple(map(str, end))) for end in number._mpi_)
+        return "interval of " + " to ".join(str(tuple(map(str, end))) for end in ends(number))
     if isinstance(getattr(number, "context", None), mpmath.MPContext):
         parts = [number.real, number.imag]
         finite = [part for part in parts if number.context.isfinite(part)]

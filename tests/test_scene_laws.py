@@ -16,7 +16,7 @@ from support.refusals import one_line
 
 import scene
 from conformance.strategies import laws
-from scene import BangBang, Cap, Fourier, Law, Stem
+from scene import BangBang, Cap, Fourier, Law, Stem, mpmath_internals as raw
 from scene.exact import Sturm, add, at, multiply, negative_point, root_bound, scale, vanishes
 from scene.laws import (
     LEAST_NORMAL,
@@ -232,7 +232,7 @@ FINE.prec = IV.prec = 400  # bits
 
 def truth(law: Law) -> list[tuple[mpf, mpf]]:
     """Enclose the numbers that `bounds` bounds."""
-    return [tuple(FINE.make_mpf(end) for end in interval._mpi_) for interval in enclosures(law)]
+    return [tuple(FINE.make_mpf(end) for end in raw.ends(interval)) for interval in enclosures(law)]
 
 
 def enclosures(law: Law) -> Bounds:

@@ -55,6 +55,7 @@ from scene import (
     Undecided,
     Undefined,
     from_data,
+    mpmath_internals as raw,
 )
 from scene.protocol.rules import may_be_refused, without_loose
 
@@ -139,7 +140,7 @@ def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> St
 
 def ends(enclosure: reference.Enclosure) -> Ends:
     """Return both ends of one of the reference's enclosures, exactly."""
-    return rational(enclosure.lo._mpf_), rational(enclosure.hi._mpf_)
+    return rational(raw.number(enclosure.lo)), rational(raw.number(enclosure.hi))
 
 
 def collided(outcome: reference.Collision) -> dict[str, Ends]:
@@ -293,7 +294,8 @@ def _followed(
 ) -> tuple[reference.Trajectory, list[Mark]]:
     """Return the proved path of a question, and of a flow what each hit says of capture."""
     assert question.collisions is not None
-    n, t_end = question.collisions, question.t_end
+    n = question.collisions
+    t_end = question.t_end
     try:
         path = reference.trajectory(
             scene, question.state, n, t_end, working=working, is_differentiated=True
@@ -464,7 +466,7 @@ def _is_captured(scene: Mushroom, step: reference.Collision) -> bool:
     departure = step.departure
 
     def interval(enclosure: reference.Enclosure) -> Interval:
-        return arithmetic.hull(*(arithmetic.point(end._mpf_) for end in enclosure))
+        return arithmetic.hull(*(arithmetic.point(raw.number(end)) for end in enclosure))
 
     x, y, vx, vy = (interval(getattr(departure, name)) for name in ("x", "y", "vx", "vy"))
     flight = EnclosedFlight(departure.instant, x, y, vx, vy, interval(departure.begin))

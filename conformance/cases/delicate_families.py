@@ -259,9 +259,8 @@ def extreme_scale(draw: Draw) -> Question:
     start, t_end = state(draw, of, {})
     length = draw.pick(range(-LARGEST, LARGEST + 1))
     units = draw.pick(range(-LARGEST, LARGEST + 1))
-    units = min(
-        max(units, length - 380), length + 380
-    )  # speeds beyond 2^400 are refused by every stepper
+    # Speeds beyond 2^400 are refused by every stepper.
+    units = min(max(units, length - 380), length + 380)
     return Question(
         scaled(of, length, units), scaled_state(start, length, units), 2.0**units * t_end
     )

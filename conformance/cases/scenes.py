@@ -53,10 +53,11 @@ LONGEST = 8.0  # periods of one flight
 # refuse: of sixteen waves the last is 2^24 of its own periods late by then, and much of a phase is
 # lost.
 LATE = 9, 20
+# The law that says how large a wall is; that of a side is its width.
 REACH = {
     "arc": "r",
     "floor": "h",
-}  # the law that says how large a wall is; that of a side is its width
+}
 
 
 class Clock(NamedTuple):

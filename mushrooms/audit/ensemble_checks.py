@@ -434,8 +434,8 @@ def _told_by_captures(given: GivenEnsemble, theirs: Theory, wrong: set[str]) -> 
         how = "before" if drop < 0 else "after"
         yield (
             f"captured particles are let out {how} the mouth is as wide as when they were caught"
-            " (nu by"
-            f" {abs(drop):.3f}): the mouth's edge leaks, or base and arc do not keep the angle"
+            f" (nu by {abs(drop):.3f}): the mouth's edge leaks, or base and arc do not keep the"
+            " angle"
         )
     elif SHARE in wrong:
         share = float(np.mean(np.isfinite(given.t_in)))
@@ -443,8 +443,7 @@ def _told_by_captures(given: GivenEnsemble, theirs: Theory, wrong: set[str]) -> 
         more = "; or starts are not uniform"
         yield (
             f"too {few} are captured, {share:.1%} for {1 - theirs.p_nc:.1%}: the mouth is not as"
-            " wide as its"
-            " law says, as where its corners"
+            " wide as its law says, as where its corners"
             f" leak{more if wrong.isdisjoint((TIMES, CAPTURED)) else ''}"
         )
 
@@ -467,8 +466,8 @@ def _rivals(given: GivenEnsemble, theirs: Theory, right_groups: bool) -> Iterato
         p = _share_of_the_free(given, theirs)
         yield Rival(
             f"never captured {p:.1%}, where theory has {theirs.p_nc:.1%}, both with the right"
-            " energies:"
-            " starts are not uniform in area and direction, or a share of one group is lost",
+            " energies: starts are not uniform in area and direction, or a share of one group is"
+            " lost",
             lambda s: p * theirs.free_cdf(s) + (1 - p) * theirs.captured_cdf(s),
         )
     variance = max(theirs.peak[1], 1e-18)

@@ -435,8 +435,7 @@ ALL = (
         "M2",
         "The cycles, with the direction of time; colours mark the phase. Left: the plane of eq. "
         "(cycle). Middle and right: the plane of sec. 3.5, in which energy grows when the loop"
-        " bounds"
-        " an area (M12). The moving cap's runs clockwise, as its caption in the paper says.",
+        " bounds an area (M12). The moving cap's runs clockwise, as its caption in the paper says.",
         loops,
         partial(new_figure, 9.6, 3.4, 1, 3),
     ),
@@ -448,9 +447,8 @@ ALL = (
     ),
     Picture(
         "M7",
-        "Width of the uncaptured peak against energy, with fitted powers, and the power as printed."
-        " "
-        "Error bars are smaller than the marks.",
+        "Width of the uncaptured peak against energy, with fitted powers, and the power as"
+        " printed. Error bars are smaller than the marks.",
         widths,
         partial(new_figure, 5.4, 3.8),
         (*PEAKS, *ERGODIC[1:]),
@@ -467,10 +465,8 @@ ALL = (
     Picture(
         "X1",
         "Energies after one cycle, fixed cap. In theory (orange) the never captured share one"
-        " energy,"
-        " dashed. The other curve is the theory at this energy, with diffusion and lags from frozen"
-        " tables"
-        " and nothing fitted.",
+        " energy, dashed. The other curve is the theory at this energy, with diffusion and lags"
+        " from frozen tables and nothing fitted.",
         energies,
         partial(with_residuals, 2),
         (ACW, CW),
@@ -478,8 +474,7 @@ ALL = (
     Picture(
         "X2",
         "Energies after one cycle, moving cap; as above. The orange density is infinite at its"
-        " right"
-        " end, the caustic of N5; drawn is its mean over one bar.",
+        " right end, the caustic of N5; drawn is its mean over one bar.",
         energies,
         partial(with_residuals, 2),
         ("moving-cap@1e6", MAIN_RUN),
@@ -494,8 +489,7 @@ ALL = (
     Picture(
         "X4",
         "Many cycles: the centre and, on a logarithmic axis, the tails, with sums drawn from the"
-        " theory at "
-        "this energy.",
+        " theory at this energy.",
         sums,
         partial(new_figure, 9.6, 6.4, 2, 2),
         (MANY_SLOWER,),
@@ -507,8 +501,7 @@ ALL = (
     Picture(
         "X6",
         "Tilted and upright stem: energies of the never captured, each counted from its own"
-        " theory's "
-        "log E_nc. Parabolic orbits between the upright sides spread them far.",
+        " theory's log E_nc. Parabolic orbits between the upright sides spread them far.",
         stems,
         partial(new_figure, 9.6, 3.4, 1, 2),
         ("moving-cap@1e6", "untilted@1e6"),
@@ -516,10 +509,8 @@ ALL = (
     Picture(
         "X7",
         "A loop without an interior that accelerates. Left: one parameter moves along the arc and"
-        " back; "
-        "captures (blue) and their releases (orange), at the same V_ell/V_cap, lie at different"
-        " V_cap/V. "
-        "Right: energies after one cycle, as in X1.",
+        " back; captures (blue) and their releases (orange), at the same V_ell/V_cap, lie at"
+        " different V_cap/V. Right: energies after one cycle, as in X1.",
         retraced,
         partial(new_figure, 9.6, 3.6, 1, 2),
         ("retraced-arc@1e6",),
@@ -540,8 +531,7 @@ ALL = (
     Picture(
         "L4",
         "Release: how far nu at release is from nu at capture, against 1/v (grey: single"
-        " particles), "
-        "and its distribution in units of 1/v.",
+        " particles), and its distribution in units of 1/v.",
         release,
         partial(new_figure, 9.6, 3.4, 1, 2),
         LADDER[1:6],

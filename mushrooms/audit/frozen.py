@@ -71,9 +71,8 @@ SWAY_PERIOD = 200.0  # in units of TAIL, for the lag: the walls' speed is then c
 N_DIFFUSING = 2000
 N_LAGGING = 2000
 N_WAITING = 3000
-FINER = {
-    "moving-cap": 4.0
-}  # times as many particles: with fewer, diffusion was by chance 1.5 % too small
+# Times as many particles: with fewer, diffusion was by chance 1.5 % too small.
+FINER = {"moving-cap": 4.0}
 N_GROUPS = 8  # of particles, by which errors are found
 AT_ONCE = 20_000  # turns of chords
 CROWDED = 4  # power by which places within the mouth are crowded at its rim, where waits are long
@@ -205,9 +204,8 @@ def passages(
     cell = np.linspace(-0.5, 0.5, 9)
     tables = [table_at(fp, scene, t + x * scene.period / N_PHASES) for x in cell]
     sigma = np.interp(random.uniform(-0.5, 0.5, n), cell, [float(one.w / one.r) for one in tables])
-    sigma = sigma[
-        sigma < 1.0
-    ]  # a mouth that rests wide open leaves no island, and its rim does not turn
+    # A mouth that rests wide open leaves no island, and its rim does not turn.
+    sigma = sigma[sigma < 1.0]
     return turned(now, sigma, sigma, widening(now) / speed, random, math.inf)
 
 

@@ -297,7 +297,6 @@ def to_text(data: Data) -> str:
         "",
         f"{n_right} of {len(data['findings'])} claims have their expected verdict."
         f" {alarms['tests']} comparisons with random data at {alarms['standard_errors']:.2f}"
-        " standard errors:"
-        f" a false alarm in fewer than {alarms['bound']:.1e} of audits.",
+        f" standard errors: a false alarm in fewer than {alarms['bound']:.1e} of audits.",
     ]
     return "\n".join(lines) + "\n"

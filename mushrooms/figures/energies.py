@@ -171,9 +171,8 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
     energy = check_energy(energy)
     found = known(scene, energy)
     bars = gathered(gains)
-    figure, (above, below) = new_figure(
-        6.4, 8.4, 2, 1
-    )  # one below the other: legible on a telephone
+    # One below the other: legible on a telephone.
+    figure, (above, below) = new_figure(6.4, 8.4, 2, 1)
     cycles = np.arange(len(bars.mean) + 1)
     mean, sd, few = (
         np.pad(x, [*[(0, 0)] * (x.ndim - 1), (1, 0)]) for x in (bars.mean, bars.sd, bars.few)
@@ -188,21 +187,7 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
     above.errorbar(
         cycles[shown], mean[shown], error, fmt="o", color=BLUE, markersize=3.5, label="mean"
     )
-    predictions = [(k, predicted(RunSpec(scene, energy, int(k), 0))) for k in shown[1:]]
-    if all(one is not None for _, one in predictions):
-        line = np.array([0.0, *(k * one.m1 for k, one in predictions if one is not None)])
-        above.plot(
-            cycles[shown],
-            line,
-            color=BLACK,
-            linewidth=1.5,
-            label=f"theory, m1 = {line[1]:.4f} a cycle",
-        )
-        spread = np.array(
-            [0.0, *((k * one.variance) ** 0.5 for k, one in predictions if one is not None)]
-        )
-        for edge, label in ((line - spread, "theory ± its sd"), (line + spread, "_")):
-            above.plot(cycles[shown], edge, color=BLACK, linewidth=0.9, linestyle=":", label=label)
+    _draw_predictions(above, scene, energy, shown)
     above.set(
         xlabel="cycle of the walls",
         ylabel="ln(E/E0)",
@@ -214,6 +199,25 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
     for axes in (above, below):
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
     return figure
+
+
+def _draw_predictions(axes: Axes, scene: Scene, energy: float, shown: FloatArray) -> None:
+    """Draw theory's mean after each of some cycles, and its spread, if it has them all."""
+    predictions = [(k, predicted(RunSpec(scene, energy, int(k), 0))) for k in shown[1:]]
+    if all(one is not None for _, one in predictions):
+        line = np.array([0.0, *(k * one.m1 for k, one in predictions if one is not None)])
+        axes.plot(
+            shown,
+            line,
+            color=BLACK,
+            linewidth=1.5,
+            label=f"theory, m1 = {line[1]:.4f} a cycle",
+        )
+        spread = np.array(
+            [0.0, *((k * one.variance) ** 0.5 for k, one in predictions if one is not None)]
+        )
+        for edge, label in ((line - spread, "theory ± its sd"), (line + spread, "_")):
+            axes.plot(shown, edge, color=BLACK, linewidth=0.9, linestyle=":", label=label)
 
 
 def _title(scene: Scene, energy: float, bars: Gathered, n_particles: int | None) -> str:

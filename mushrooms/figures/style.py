@@ -112,6 +112,5 @@ def svg(figure: Figure) -> bytes:
     text = re.sub(
         rb'<!--.*?-->|(?<=<g) id="[^"]*"| transform="rotate\(-0 [^"]*"', b"", file.getvalue()
     )
-    return re.sub(
-        rb"(\.\d\d)\d+(?=[^<>]*>)", rb"\1", text
-    )  # within tags: numbers that are read stay
+    # Within tags: numbers that are read stay.
+    return re.sub(rb"(\.\d\d)\d+(?=[^<>]*>)", rb"\1", text)

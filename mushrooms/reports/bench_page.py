@@ -148,10 +148,11 @@ NAMED = {
     "steps, flight/100": "time steps, C",
     "proof, 200 digits": "reference, with proof",
 }
+# Of their names, by family.
 PLACES = {
     "time-stepping": ((-14, 0), "right"),
     "proof": ((6, 14), "right"),
-}  # of their names, by family
+}
 LABEL = 9  # size of text [points]
 MOST_DIGITS = 300.0
 LEAST_DIGITS = 0.5

@@ -283,8 +283,7 @@ def open_or_create(
         if spec.n_cycles > most:
             raise BadInput(
                 f"output {str(folder)!r}: --cycles = {spec.n_cycles}, must be at most {most} for a"
-                " run that"
-                f" began with {found['cycles_of_a_chunk']}: more need another folder"
+                f" run that began with {found['cycles_of_a_chunk']}: more need another folder"
             )
     if n_particles > MOST_BLOCKS * found["block"]:
         least = -(-n_particles // MOST_BLOCKS)
@@ -299,12 +298,15 @@ def open_or_create(
         _probe(run)
         run.describe()
         if damaged:
-            few = ", ".join(map(str, damaged[:5])) + (" ..." if len(damaged) > 5 else "")
-            print(
-                f"damaged or broken off: {len(damaged)} blocks ({few}), followed again",
-                file=sys.stderr,
-            )
+            _tell_damaged(damaged)
     return run
+
+
+def _tell_damaged(blocks: list[int]) -> None:
+    """Say on stderr which blocks are followed again."""
+    few = ", ".join(map(str, blocks[:5])) + (" ..." if len(blocks) > 5 else "")
+    count = f"damaged or broken off: {len(blocks)} blocks ({few}), followed again"
+    print(count, file=sys.stderr)
 
 
 def read_description(folder: Path, spec: RunSpec, more: dict[str, object]) -> dict[str, Any]:
@@ -359,9 +361,8 @@ def complete(
     there = n - sum(block_range.n for block_range in run.lacking() if block_range.first < n)
 
     def report(n_done: int) -> None:
-        on_progress(
-            max(0, there + n_done)
-        )  # the last block may have more particles than are asked for
+        # The last block may have more particles than are asked for.
+        on_progress(max(0, there + n_done))
         if max_seconds is not None and CLOCK() - begin > max_seconds:
             raise LimitReached(f"--max-seconds = {max_seconds:g} have passed")
 
@@ -411,8 +412,8 @@ def _compare(run: StoredRun, one: fast.Paused, other: fast.Paused) -> None:
             by = next((key for key in here if made.get(key) != here[key]), "versions")
             raise BadInput(
                 f"output {str(run.folder)!r}: {name} of its first particles comes out otherwise"
-                " here, where"
-                f" {by} = {here[by]}; it was made by {made.get(by)}; another --out begins anew"
+                f" here, where {by} = {here[by]}; it was made by {made.get(by)}; another --out"
+                " begins anew"
             )
 
 

@@ -114,8 +114,7 @@ def _tables(run: StoredRun, watch: Watch) -> Iterator[Arrays]:
     if n_columns > MAX_COLUMNS:
         raise BadInput(
             f"a table of {n_columns} columns, must be at most {MAX_COLUMNS}: export to .npz, or"
-            " read"
-            f" {GROUP} with xarray"
+            f" read {GROUP} with xarray"
         )
     for number in range(run.shape.n_blocks):
         first = number * run.shape.block

@@ -146,9 +146,8 @@ def careful_note(summary: Mapping[str, Any]) -> str | None:
         return None
     return (
         f"careful steps: {share:.2g} of the collisions, some {part:.0%} of the time. They are as"
-        " right as the"
-        " others. Walls that move far between two collisions need them: at higher energy they are"
-        " fewer"
+        " right as the others. Walls that move far between two collisions need them: at higher"
+        " energy they are fewer"
     )
 
 

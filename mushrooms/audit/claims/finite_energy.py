@@ -397,9 +397,8 @@ def ergodic_mean(evidence: ClaimEvidence) -> list[Check]:
 
 def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
     """M9: the mean of s is biased at finite energy; the mean of exp(-s/2) is not."""
-    low, *samples = evidence.samples(
-        *LADDER
-    )  # the lowest is below the speeds of the theory of finite energy
+    # The lowest is below the speeds of the theory of finite energy.
+    low, *samples = evidence.samples(*LADDER)
     theirs = float(evidence.predict("moving-cap").m1)
     yield close(f"{low.run.name}: mean of s is m1, no bias", mean(low.gain), theirs, form="printed")
     values, errors = np.array([mean(sample.gain) for sample in samples]).T

@@ -314,9 +314,8 @@ def measures(evidence: ClaimEvidence) -> list[Check]:
     energy = 2.0
     area = 1.0
     printed = 2 * fp.pi * fp.sqrt(2 * energy) * area
-    rate = (
-        2 * fp.pi * ((energy + 1) - (energy - 1)) * area / 2
-    )  # of the volume below H = E: a disk times A
+    # Of the volume below H = E: a disk times A.
+    rate = 2 * fp.pi * ((energy + 1) - (energy - 1)) * area / 2
     return [
         exact(
             "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)",

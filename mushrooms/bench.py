@@ -29,7 +29,6 @@ from conformance.bench.solvers import (
 )
 from conformance.bench.workloads import FLIGHTS, Workload
 from conformance.cases.certify import Links, collided, proved_step
-from conformance.files import write_files
 from conformance.grading.agreement import Answer, Enclosed, exact
 from conformance.harness.examples import find_examples
 from conformance.suite.process import CheckFailure
@@ -37,9 +36,12 @@ from conformance.suite.session import Limits
 from fast.batch import careful_steps, fine_steps, lane_steps
 from fast.paths import carry
 from mushrooms.figures import style
-from mushrooms.output import announce_compilation, progress_bar, refuse_unheeded, writable_folder
+from mushrooms.folders import writable_folder
+from mushrooms.progress import announce_compilation, progress_bar
 from mushrooms.reports import bench_page
 from scene import BadInput, Collision, Scene, State
+from scene.files.writer import write_files
+from scene.refusal import refuse_unheeded
 
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
 # By size: questions of a workload, steps with walls only, runs, trajectories and their length.

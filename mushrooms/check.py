@@ -12,7 +12,6 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 from conformance import vectors
-from conformance.files import write_file
 from conformance.suite import VERDICTS, Run, check, read_known, reports
 from conformance.suite.run import NEW_SEEDS, choose
 from conformance.suite.session import Limits
@@ -25,16 +24,12 @@ from conformance.suite.sheet import (
     write_lines,
     write_tables,
 )
-from mushrooms.output import (
-    Watch,
-    check_file,
-    new_console,
-    print_table,
-    progress_bar,
-    refuse_unheeded,
-    writable_folder,
-)
+from mushrooms.folders import check_file, writable_folder
+from mushrooms.output import new_console, print_table
+from mushrooms.progress import Watch, progress_bar
 from scene import BadInput
+from scene.files.writer import write_file
+from scene.refusal import refuse_unheeded
 
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
 MAX_TAUGHT = 5  # of them with what was given and what is certified, or with what was sent

@@ -115,7 +115,7 @@ def theory(
     """Print the paper's predictions for one cycle as decimal strings.
 
     With --energy also predict at that energy, with the possible error of the prediction. This needs rates
-    that python -m conformance.audit.frozen measures. They are known for moving-cap, moving-cap-trivial, both
+    that python -m mushrooms.audit.frozen measures. They are known for moving-cap, moving-cap-trivial, both
     fixed caps, ergodic, retraced-arc, the scenes of the audit, and the reverses of all these. For another
     scene only the limit of high energies is printed, and a line on stderr says why.
     """
@@ -356,7 +356,7 @@ def audit(
 
     Exit code 0 if every claim has its expected verdict, 1 if one has not, 2 on bad input.
     """
-    from mushrooms.audit import audit_claims
+    from mushrooms.audit.command import audit_claims
 
     return audit_claims(
         out, full, only, seed, threads, resume, commands, as_json,

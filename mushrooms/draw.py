@@ -8,16 +8,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import fast
-from conformance.audit.runs import is_scene, scene_named
-from conformance.files import write_file
 from mushrooms import orbits
 from mushrooms.figures import energies, orbits as pictures, style, table as tables
-from mushrooms.output import Watch, announce_compilation, check_file, progress_bar, refuse_unheeded
+from mushrooms.folders import check_file
+from mushrooms.progress import Watch, announce_compilation, progress_bar
 from mushrooms.simulate import draw_energies
 from mushrooms.store.run import is_run, open_run
-from mushrooms.tables import SUFFIXES
 from scene import BadInput, Scene, Stem
+from scene.files.tables import SUFFIXES
+from scene.files.writer import write_file
 from scene.laws import bounds
+from scene.named import is_scene, scene_named
+from scene.refusal import refuse_unheeded
 from scene.tables import laws
 
 

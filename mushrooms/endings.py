@@ -159,7 +159,7 @@ def _tell(code: int, message: str, error: BaseException | None = None) -> int:
 
 
 def _format_error(error: OSError) -> str:
-    """Return what the system refused; of a file it gives the name (`conformance.files` sees to that)."""
+    """Return what the system refused; of a file it gives the name (`scene.files.writer` sees to that)."""
     if error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT):
         return f"standard output cannot be written: {error.strerror}"
     return str(error) if error.filename is None else f"{os.fsdecode(error.filename)!r}: {error.strerror}"

@@ -24,9 +24,10 @@ import theory
 from fast.ensemble import initial_states
 from fast.paths import captured, sin_phi
 from fast.validation import check_energy, check_progress
-from mushrooms.output import check_file
-from mushrooms.tables import SUFFIXES, describe, write_table
+from mushrooms import __version__
+from mushrooms.folders import check_file
 from scene import Outcome, Scene, State, Stem, Wall, check_scene
+from scene.files.tables import SUFFIXES, write_table
 from scene.geometry import TableAt, table_at
 from scene.laws import FloatArray, is_constant, values
 from scene.mouth import start_time
@@ -215,7 +216,7 @@ class FollowedOrbit:
     def write(self, path: Path | str) -> None:
         """Write the columns as .csv (floats in shortest round-trip form) or .parquet.
 
-        Scene, energy, seed and version go with them: see `mushrooms.tables`.
+        Scene, energy, seed and version go with them: see `scene.files.tables`.
 
         Raises:
             BadInput: another ending, or pyarrow is not installed.
@@ -223,6 +224,12 @@ class FollowedOrbit:
         check_file(Path(path), SUFFIXES)
         about = describe(self.scene, energy=float(self.energies()[0]), seed=self.seed)
         write_table(Path(path), [self.columns()], about)
+
+
+def describe(scene: Scene, *, energy: float, seed: int | None) -> dict[str, Any]:
+    """Return what goes with a table of particles: the scene, their initial energy, seed and version."""
+    found = {"version": __version__, "scene": scenes.to_data(scene), "energy": energy}
+    return found if seed is None else {**found, "seed": seed}
 
 
 def usual_energy(scene: Scene, crossings: float = CROSSINGS) -> float:

@@ -16,23 +16,24 @@ from rich.table import Column, Table
 import fast
 import reference
 from conformance import vectors, verify as verifier
-from conformance.audit.runs import scene_named
 from conformance.cases.attacks import UnderAttack, run
 from conformance.cases.certify import judge
 from conformance.cases.draw import wire_form
 from conformance.cases.generated import fresh_one
 from conformance.cases.table import FAMILIES
-from conformance.files import write_file
 from conformance.grading.agreement import middle
 from conformance.suite import Result, ask_vector
 from conformance.suite.process import CheckFailure
 from conformance.suite.run import N_FRESH, Transform, draw_transform
 from conformance.suite.session import Session, outcomes_of
-from conformance.suite.sheet import read_number, read_rows
 from mushrooms.check import format_outcome
-from mushrooms.output import announce_compilation, check_file, new_console, print_table, progress_bar
-from mushrooms.tables import check_digest
+from mushrooms.folders import check_file
+from mushrooms.output import new_console, print_table
+from mushrooms.progress import announce_compilation, progress_bar
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined, from_data
+from scene.files.tables import check_digest, read_number, read_rows
+from scene.files.writer import write_file
+from scene.named import scene_named
 from scene.refusal import shown
 
 

@@ -9,11 +9,12 @@ from rich.table import Column, Table
 
 import scene as scenes
 import theory
-from conformance.audit.runs import SCENES, scene_named
-from mushrooms.output import new_console, print_pairs, print_table, progress_bar
+from mushrooms.output import new_console, print_pairs, print_table
+from mushrooms.progress import progress_bar
 from mushrooms.store.summary import expected_collisions
 from scene import BadInput, Scene
 from scene.load import catalogue_text, read_data
+from scene.named import SCENES, scene_named
 
 
 def print_scenes(name: str, as_toml: bool, as_json: bool) -> None:

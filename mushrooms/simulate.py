@@ -12,25 +12,19 @@ import numpy as np
 import typer
 
 import fast
-from conformance.audit.runs import scene_named
-from conformance.files import named, write_file
 from fast.validation import check_phases
-from mushrooms.output import (
-    Watch,
-    announce_compilation,
-    check_file,
-    locked,
-    print_pairs,
-    progress_bar,
-    refuse_unheeded,
-    writable_folder,
-)
+from mushrooms.folders import check_file, locked, writable_folder
+from mushrooms.output import print_pairs
+from mushrooms.progress import Watch, announce_compilation, progress_bar
 from mushrooms.store import conduct
 from mushrooms.store.run import StoredRun
 from mushrooms.store.spec import RunSpec
 from mushrooms.store.summary import RunTally, careful_note, explain_limit, gain_of, measured, tally_of
 from scene import BadInput
+from scene.files.writer import named, write_file
 from scene.mouth import one_cycle
+from scene.named import scene_named
+from scene.refusal import refuse_unheeded
 
 Gains = Callable[[], Iterable[Any]]  # returns ln(E/E0) after each cycle, block by block
 MOST_IN_MEMORY = 10**8  # particles

@@ -11,7 +11,7 @@ import pytest
 from conformance.cases.draw import Draw
 from conformance.profiles import margin
 from conformance.suite import pytest_plugin
-from conformance.suite.checks import flows, paths, requests
+from conformance.suite.checks import bad_input, flows, path_judge, spelling
 from conformance.suite.checks.form import Implementation, octaves
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import graded_parts
@@ -39,7 +39,7 @@ def test_one_number_is_drawn_from_each_octave(low, high):
     assert lowest < low * min(1.1, (high / low) ** 0.1)
 
 
-@pytest.mark.parametrize("make", [requests._wave, requests._legs])
+@pytest.mark.parametrize("make", [bad_input._wave, bad_input._legs])
 @pytest.mark.parametrize("off", [1.0, -1.0])
 @pytest.mark.parametrize(("bound", "far"), [(0.5, 1.5), (1.5, 0.5), (0.0, 1.0), (1.25, 0.75)])
 def test_a_law_that_is_broken_for_a_while_keeps_to_its_values(make, off, bound, far):
@@ -135,16 +135,16 @@ def test_what_comes_after_a_malformed_line_is_answered_as_before(refusal, after,
     asked = [(START, question("step", SCENE, START, 9.0))]
     side = Implementation(session, "step")
     if said is None:
-        assert requests.passed_over(side, SCENE, asked)
-        assert is_disturbed == [line for line, _ in requests.MALFORMED]
+        assert spelling.passed_over(side, SCENE, asked)
+        assert is_disturbed == [line for line, _ in spelling.MALFORMED]
     else:
         with pytest.raises((CheckFailure, AssertionError), match=said):
-            requests.passed_over(side, SCENE, asked)
+            spelling.passed_over(side, SCENE, asked)
 
 
 def test_starts_at_either_zero_go_to_every_side_that_is_open():
     """From the mouth up and down; from a base only away from it."""
-    asked = list(requests.zeros(Draw("zeros"), "step"))
+    asked = list(spelling.zeros(Draw("zeros"), "step"))
     ways = {(type(scene), start.vy > 0, start.wall) for scene, start, _, _ in asked}
     up, down = True, False
     assert ways == {(Cap, up, "base"), (Stem, down, "base"), (Mushroom, up, None), (Mushroom, down, None)}
@@ -199,14 +199,52 @@ SPOILT: list[tuple[dict[str, Any], str]] = [
 @pytest.mark.parametrize(("changes", "said"), SPOILT, ids=range(len(SPOILT)))
 def test_a_hit_to_which_no_flight_led_is_named_by_its_flaw(changes, said):
     right = Collision(dt=0.5, t=0.5, x=0.125, y=0.0, vx=0.0, vy=1.0, wall="base")
-    flaw = paths.flaw_of(SCENE, FALLING, [msgspec.structs.replace(right, **changes)], {})
+    flaw = path_judge.flaw_of(SCENE, FALLING, [msgspec.structs.replace(right, **changes)], {})
     assert flaw == (f"outcome 1 {said}" if said else "")
+
+
+@pytest.mark.parametrize("profile", ["step", "trajectory", "flow"])
+def test_states_are_asked_about_up_to_a_time_that_is_near(profile):
+    """At once or soon after; a trajectory has time to go on. A start that is late is so by its own time."""
+    ahead = set()
+    for _, asked, why in bad_input.bad_states(Draw("states"), profile):
+        starts = asked["states"] if profile == "flow" else [asked["state"]]
+        late = {round(start["t"] - asked["t_end"], 12) for start in starts}
+        if "begins after" in why:
+            assert late == {1.0}
+        else:
+            ahead |= late
+            assert all(0.0 <= start["t"] < 3.0 for start in starts)
+    assert ahead == {-1.0} if profile == "trajectory" else {0.0, -(2.0**-6)}
+
+
+TAGGED = {"type": "object", "properties": {"kind": {"enum": ["wave"]}, "x": {"type": "number"}}}
+TWICE = {"type": "object", "properties": {"kind": {"enum": ["wave"]}, "wall": {"enum": ["arc"]}}}
+FORMS: list[tuple[dict[str, Any], Any, bool]] = [
+    ({"type": "null"}, None, True), ({"type": "null"}, 1.0, False), ({"type": "number"}, None, False),
+    ({"type": "boolean"}, True, True), ({"type": "integer"}, True, False), ({"type": "number"}, True, False),
+    ({"type": "integer"}, 1, True), ({"type": "number"}, 1, True), ({"type": "integer"}, 1.0, False),
+    ({"type": "number"}, 1.0, True), ({"type": "string"}, "1.0", True), ({"type": "number"}, "1.0", False),
+    ({"enum": ["arc"]}, "arc", True), ({"enum": ["arc"]}, 1.0, False), ({"type": "array"}, [1.0], True),
+    ({"type": "array"}, (1.0,), True), ({"type": "object"}, [1.0], False), ({"type": "array"}, {}, False),
+    ({"type": ["number", "null"]}, None, True), ({"type": ["number", "null"]}, "x", False),
+    ({"type": "object"}, {}, True), (TAGGED, {"kind": "wave"}, True), (TAGGED, {"kind": "legs"}, False),
+    (TAGGED, {"x": 1.0}, True), (TAGGED, 1.0, False), ({}, 1.0, False),
+    (TWICE, {"kind": "wave", "wall": "arc"}, True), (TWICE, {"kind": "wave", "wall": "no"}, False),
+    (TWICE, {"kind": "no", "wall": "arc"}, False),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("form", "value", "is_meant"), FORMS, ids=range(len(FORMS)))
+def test_a_form_of_the_schema_is_meant_by_values_of_its_type_and_tag(form, value, is_meant):
+    """A whole number is a number too; an object whose tag is missing may be of any form."""
+    assert bad_input._fits(form, value) is is_meant
 
 
 @pytest.mark.parametrize("profile", ["step", "trajectory", "flow"])
 def test_bad_states_are_bad_for_what_is_said_alone(profile):
     """Only a start that is late on purpose is asked about up to an earlier time."""
-    for scene, asked, why in requests.bad_states(Draw("states"), profile):
+    for scene, asked, why in bad_input.bad_states(Draw("states"), profile):
         starts = asked["states"] if profile == "flow" else [asked["state"]]
         assert all((asked["t_end"] < start["t"]) == ("begins after" in why) for start in starts), (scene, why)
 

@@ -11,9 +11,9 @@ from numba.core import event
 from support.entries import kept_entries
 
 import fast
-from conformance.audit import session
 from fast.kernel import fine_step, follow, path, scalar_step, worker
-from mushrooms import bench, orbits, output, questions
+from mushrooms import bench, orbits, progress, questions
+from mushrooms.audit import session
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled without the compiler")
 ROOT = Path(__file__).parent.parent
@@ -48,7 +48,7 @@ def test_each_kernel_that_takes_long_is_announced_and_no_other(capsys):
     assert len(entries) > 30
     announced = {}
     for entry in entries:
-        with output.announce_compilation():
+        with progress.announce_compilation():
             compile_again(entry)
         announced.setdefault(capsys.readouterr().err, set()).add(entry.py_func.__name__)
     assert announced == {
@@ -62,7 +62,7 @@ def test_each_kernel_that_takes_long_is_announced_and_no_other(capsys):
 
 def test_what_is_compiled_together_is_announced_once(capsys):
     loops = [*worker.FLIES.values(), *worker.CHORDS.values(), *path.PATHS.values()]
-    with output.announce_compilation():
+    with progress.announce_compilation():
         compile_again(scalar_step.scalar_step, *loops, follow.follow_particles, fine_step.fine_path)
     assert capsys.readouterr().err == SLOW + FINE
 

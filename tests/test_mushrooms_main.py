@@ -23,7 +23,6 @@ import fast
 import scene as scenes
 import theory
 from conformance.cases.table import FAMILIES
-from conformance.files import write_files
 from mushrooms import questions
 from mushrooms.commands import app
 from mushrooms.figures import table
@@ -32,6 +31,7 @@ from mushrooms.output import new_console, print_pairs
 from mushrooms.scenes import FIGURES
 from mushrooms.store.summary import expected_collisions
 from scene import BangBang, Mushroom, load
+from scene.files.writer import write_files
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,8 @@ from support.refusals import assert_refused
 
 import fast
 import mushrooms
-from mushrooms import audit_ensemble, draw
+from mushrooms import draw
+from mushrooms.audit import ensemble_command
 from mushrooms.main import run
 from mushrooms.store import export as exports
 from mushrooms.store.run import open_run
@@ -121,8 +122,8 @@ def of_npz(folder):
 
 def of_audit(path, energy=None):
     def read(_folder):
-        options = audit_ensemble.Options(energy, "v2/2", None, None)
-        given, _notes = audit_ensemble.read(Path(path), load("moving-cap"), options)
+        options = ensemble_command.Options(energy, "v2/2", None, None)
+        given, _notes = ensemble_command.read(Path(path), load("moving-cap"), options)
         return ENERGY * np.exp(given.s)
 
     return read

@@ -20,8 +20,6 @@ import conformance
 import fast
 import theory
 from conformance import vectors
-from conformance.audit.claim import Check
-from conformance.audit.ensemble import GivenEnsemble
 from conformance.bench import record, scoreboard
 from conformance.grading.agreement import middle
 from conformance.harness.examples import Example
@@ -29,10 +27,14 @@ from conformance.suite import Result, Run
 from conformance.suite.result import Speed
 from conformance.suite.session import Limits
 from fast.batch import careful_steps, fine_steps, lane_steps
-from mushrooms import audit_ensemble, bench, check
+from mushrooms import bench, check
+from mushrooms.audit import ensemble_command
+from mushrooms.audit.claim import Check
+from mushrooms.audit.ensemble_checks import GivenEnsemble
+from mushrooms.audit.page import pull
 from mushrooms.figures import style
 from mushrooms.reports import bench_page, check_page
-from mushrooms.reports.page import number, pull
+from mushrooms.reports.page import number
 from scene import BadInput, Horizon, State, from_data, load
 from scene.geometry import table_at
 
@@ -49,7 +51,7 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
         return b"<svg/>"
 
     monkeypatch.setattr(style, "svg", note)
-    for module in (audit_ensemble,):
+    for module in (ensemble_command,):
         monkeypatch.setattr(module, "svg", note)
     return seen
 
@@ -214,6 +216,51 @@ def test_the_page_of_a_check_lists_the_first_cases_and_counts_the_rest(monkeypat
     assert (BAD[-1].id in text) == (n_left <= 0)
 
 
+def cells(row: str) -> list[str]:
+    return [re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<t[hd].*?</t[hd]>", row, re.S)]
+
+
+def test_the_page_of_a_check_counts_verdicts_by_group():
+    """A verdict that nothing has gets no column, but for pass; a known failure is listed with its mark."""
+    known = [
+        a_result("arc/2", "fail", "as it is", is_known=True),
+        a_result("arc/3", "pass", "after all", is_known=True),
+    ]
+    further = [a_result("property/turn", "pass", "turned"), a_result("profile/time", "fail", "slow")]
+    beyond = a_result("stem/9", "pass", relative=1.0)
+    for results, seen in (
+        ([*GOOD, *BAD, *known, *further, beyond],
+         ["pass", "fail", "declined", "unsupported", "crashed", "timed-out"]),
+        ([a_result("cap/1", "timed-out", "slow")], ["pass", "timed-out"]),
+    ):  # fmt: skip
+        run = a_run(*results)
+        page = check_page.to_html(run)
+        table = page.partition("<h2>Verdicts by group</h2>")[2].partition("</table>")[0]
+        head, *rows = [found for found in map(cells, table.split("</tr>")) if found]
+        assert head == ["Group", "Cases", *seen, "Worst ulps", "A/B/C", "Class"]
+        groups = list(dict.fromkeys(one.group for one in results))
+        assert [row[0] for row in rows] == [*groups, "all"]
+        for row in rows:
+            own = [one for one in results if row[0] in (one.group, "all")]
+            counts = [sum(one.verdict == verdict for one in own) for verdict in seen]
+            assert row[1 : 2 + len(seen)] == [str(n) for n in (len(own), *counts)]
+        listed = page.partition("<h2>All that did not pass</h2>")[2].partition("</table>")[0]
+        rows = [found for found in map(cells, listed.split("</tr>")) if found][1:]
+        assert rows == [
+            [one.id, one.verdict + (" (known)" if one.is_known else ""), one.why]
+            for one in results
+            if one.verdict != "pass" or one.is_known
+        ]
+        listed = page.partition("<h2>Properties and profiles</h2>")[2].partition("</table>")[0]
+        rows = [found for found in map(cells, listed.split("</tr>")) if found][1:]
+        assert rows == [[one.id, one.verdict, one.why] for one in results if one in further]
+    every = cells(check_page.to_html(a_run(*GOOD, beyond)).partition("<h2>Verdicts")[2].partition("total")[2])
+    assert every[:6] == ["all", "4", "4", "inf", "2/1/1", "C"]
+    assert (
+        cells(check_page.to_html(a_run(*GOOD)).partition("<h2>Verdicts")[2].partition("total")[2])[3] == "900"
+    )
+
+
 def test_the_scoreboard_has_a_row_and_the_reasons_of_each_stepper():
     good, bad = a_run(*GOOD), a_run(*GOOD, *BAD, diagnosis=["Like a mutant: stale."], seconds=600.4)
     graded = [
@@ -345,6 +392,36 @@ def test_a_step_is_drawn_from_its_start_to_both_ends_with_its_direction(figures)
     assert whole.get_legend() is not None
 
 
+FALSE_STEPS = [  # of a step to x = 0.5, y = 0.6, vx = 1, vy = -1 at t = 1: what is given, and what is said
+    ({"x": 0.5, "y": 0.61}, "y = 0.61, must be 0.6: off by 0.01"),
+    ({"x": 0.48, "y": 0.61}, "x = 0.48, must be 0.5: off by -0.02"),
+    ({"x": 0.49, "y": 0.6, "vx": 1.02}, "vx = 1.02, must be 1: off by 0.02"),  # of sqrt 2
+    ({"x": 0.49, "y": 0.6, "vx": 1.004}, "x = 0.49, must be 0.5: off by -0.01"),
+    ({"x": 0.49, "y": 0.6, "vy": -1.1}, "vy = -1.1, must be -1: off by -0.1"),
+    ({"t": 1.125, "x": 0.49, "y": 0.6}, "t = 1.125, must be 1: off by 0.12"),
+    ({"x": 0.49, "y": 0.6, "wall": None}, "x = 0.49, must be 0.5: off by -0.01"),
+    ({"x": 0.49, "y": 0.6, "wall": "arc"}, "wall = arc, must be None"),
+]
+
+
+@pytest.mark.parametrize(("given", "said"), FALSE_STEPS, ids=range(len(FALSE_STEPS)))
+def test_the_title_of_a_false_step_names_what_is_off_most(figures, given, said):
+    """Times are measured by the time of the step, places by the table's size, velocities by the speed."""
+    state, truth = State(0.0, 0.1, 0.2, 3.0, 4.0), Horizon(1.0, 0.5, 0.6, 1.0, -1.0)
+    check_page.draw_step(load("moving-cap"), state, truth, given, "step 7")
+    assert figures[0].get_suptitle() == f"step 7: {said}"
+
+
+def test_at_time_0_and_at_rest_an_error_is_its_own_measure(figures):
+    state, truth = State(-1.0, 0.1, 0.2, 0.0, 0.0), Horizon(0.0, 0.1, 0.2, 0.0, 0.0)
+    for given, said in (
+        ({"t": 0.1, "x": 0.11, "y": 0.2}, "t = 0.1, must be 0: off by 0.1"),
+        ({"x": 0.11, "y": 0.2, "vy": 0.2}, "vy = 0.2, must be 0: off by 0.2"),
+    ):
+        check_page.draw_step(load("moving-cap"), state, truth, given, "step 1")
+        assert figures[-1].get_suptitle() == f"step 1: {said}"
+
+
 def test_a_page_lists_failures_first_and_else_the_least_precise(monkeypatch):
     failed = [a_result(f"cap/{k}", "fail", answer={}) for k in range(10)]
     assert check_page._worst(a_run(*GOOD, *failed)) == failed[:8]
@@ -367,14 +444,14 @@ def test_times_of_capture_of_an_ensemble_stand_under_theory(figures):
     found = theory.at_energy(load("moving-cap"), 1e6)
     t_in = np.linspace(1.0, 3.0, 200)
     given = GivenEnsemble(load("moving-cap"), 1e6, np.zeros(201), t_in=np.append(t_in, np.nan))
-    assert audit_ensemble.capture_times(given)
+    assert ensemble_command.capture_times(given)
     [axes] = figures[0].axes
     shown, law = bars(axes, "ensemble"), bars(axes, "theory")
     assert shown.heights == pytest.approx(np.histogram(t_in, shown.edges, density=True)[0])
     assert (shown.edges[0], shown.edges[-1]) == (1.0, 3.0)
     assert law.area == pytest.approx(float(np.ptp(found.capture_cdf(np.array([1.0, 3.0])))))
     for nothing in (None, np.full(9, np.nan), np.full(9, 2.0)):
-        assert audit_ensemble.capture_times(given._replace(t_in=nothing)) is None
+        assert ensemble_command.capture_times(given._replace(t_in=nothing)) is None
 
 
 def test_our_solvers_answer_as_one_step_does():

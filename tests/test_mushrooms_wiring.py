@@ -23,7 +23,7 @@ import mushrooms
 import scene as scenes
 import theory
 from conformance.cases.draw import wire_form
-from mushrooms import bench, draw, orbits, output, questions, scenes as listing, simulate
+from mushrooms import bench, draw, orbits, output, progress, questions, scenes as listing, simulate
 from mushrooms.figures import energies, orbits as pictures, style, table
 from mushrooms.reports import bench_page, check_page
 from mushrooms.store import conduct, export as exports, run as stored, spec, summary
@@ -31,6 +31,7 @@ from mushrooms.store.run import BlockRange
 from mushrooms.store.spec import LANES, RunSpec, shape_of
 from mushrooms.store.summary import careful_note, gain_of, tally_of
 from scene import BadInput, load
+from scene.refusal import refuse_unheeded
 
 STEM = load("fermi-ulam")
 
@@ -413,7 +414,7 @@ def test_an_output_that_is_a_folder_is_refused(command_line, tmp_path, monkeypat
     ],
 )  # fmt: skip
 def test_a_duration_has_the_unit_that_suits_it(seconds, text):
-    assert output.format_duration(seconds) == text
+    assert progress.format_duration(seconds) == text
 
 
 class Terminal(io.StringIO):
@@ -428,13 +429,13 @@ def test_progress_goes_to_standard_error_as_a_bar_or_as_lines(capsys, monkeypatc
     """Also while the clock stands still: then the time that is left is unknown."""
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "120")
-    monkeypatch.setattr(output, "CLOCK", lambda: 7.0)
-    monkeypatch.setattr(output, "FIRST", 0.0)
-    monkeypatch.setattr(output, "EVERY", 0.0)
+    monkeypatch.setattr(progress, "CLOCK", lambda: 7.0)
+    monkeypatch.setattr(progress, "FIRST", 0.0)
+    monkeypatch.setattr(progress, "EVERY", 0.0)
     told = Terminal() if is_terminal else io.StringIO()
     monkeypatch.setattr(sys, "stderr", told)
-    with output.progress_bar() as bar:
-        watch = output.Watch(bar, "run", "particles")
+    with progress.progress_bar() as bar:
+        watch = progress.Watch(bar, "run", "particles")
         watch.update(1000, 2000)
         watch.update(1500, 2000)
     lines = told.getvalue()
@@ -460,8 +461,8 @@ def test_what_nothing_heeds_is_named_with_its_value():
         ({"--c": 0}, "--c = 0 would"),
     ):  # fmt: skip
         with pytest.raises(BadInput, match=f"{words} change nothing here: why"):
-            output.refuse_unheeded(options, "why")
-    output.refuse_unheeded({"--a": None}, "why")
+            refuse_unheeded(options, "why")
+    refuse_unheeded({"--a": None}, "why")
 
 
 def test_summaries_are_of_what_was_followed():

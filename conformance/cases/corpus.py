@@ -23,7 +23,6 @@ import msgspec
 from conformance.cases.certify import certify
 from conformance.cases.draw import Question, Unfit
 from conformance.cases.table import FAMILIES
-from conformance.files import write_file
 from conformance.vectors import (
     MANIFEST,
     NUMBERS,
@@ -39,6 +38,7 @@ from conformance.vectors import (
 )
 from conformance.verify import verify_line
 from scene import BadInput
+from scene.files.writer import write_file
 
 VERSION = VERSIONS[-1]
 RETIRED: tuple[str, ...] = ()

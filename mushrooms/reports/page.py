@@ -5,7 +5,6 @@ looks like a formula there becomes italic letters, sub- and superscripts and pro
 """
 
 import json
-import math
 import re
 from typing import Any
 from urllib.parse import quote
@@ -13,7 +12,6 @@ from urllib.parse import quote
 import jinja2
 from markupsafe import Markup, escape
 
-from conformance.audit.claim import Check
 from mushrooms import __version__
 
 
@@ -33,17 +31,6 @@ def render(template: str, **fields: Any) -> str:
 def number(value: float | None, form: str) -> str:
     """Return a number in a format of Python's, such as ".2e" or ","; a dash when there is none."""
     return "–" if value is None else format(value, form)
-
-
-def pull(check: Check) -> float | None:
-    """Return how many standard errors a value is from the number expected; None where nothing is random."""
-    if check.value is None or not check.error:
-        return None
-    try:
-        found = (check.value - float(check.expected)) / check.error
-    except ValueError:  # it is held against a bound
-        return None
-    return found if math.isfinite(found) and math.isfinite(check.error) else None
 
 
 def as_json(value: Any) -> str:

@@ -16,12 +16,13 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from conformance.files import write_file
-from mushrooms.output import Watch, check_file, progress_bar
+from mushrooms.folders import check_file
+from mushrooms.progress import Watch, progress_bar
 from mushrooms.store.run import GROUP, StoredRun, attributes_of, open_run
 from mushrooms.store.spec import FIELDS, LANES, WALLS, Arrays
-from mushrooms.tables import write_table
 from scene import BadInput
+from scene.files.tables import write_table
+from scene.files.writer import write_file
 
 MAX_COLUMNS = 10_000  # of a table: programs that read tables take minutes over more
 OF_THE_STORE = ("schema", "block", "cycles_of_a_chunk")  # attributes that say nothing of a table

@@ -21,9 +21,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import zarr
 
-from conformance.files import sealed, unsealed, write_file
 from fast import Ensemble, Paused
-from mushrooms.output import Watch, progress_bar
+from mushrooms.progress import Watch, progress_bar
 from mushrooms.store.spec import (
     FIELDS,
     SCHEMA,
@@ -38,6 +37,7 @@ from mushrooms.store.spec import (
 )
 from mushrooms.store.summary import RunTally, tally_of
 from scene import BadInput
+from scene.files.writer import sealed, unsealed, write_file
 
 GROUP, MARKERS = "ensemble.zarr", "blocks"
 DESCRIPTION = "run.marker"  # among the markers: the group's attributes once more, sealed
@@ -85,7 +85,7 @@ class Marker(NamedTuple):
 
 
 class StoredRun:
-    """A run in a folder, which a writer must hold (`mushrooms.output.locked`).
+    """A run in a folder, which a writer must hold (`mushrooms.folders.locked`).
 
     Attributes:
         folder: holds GROUP, which xarray reads, and MARKERS.

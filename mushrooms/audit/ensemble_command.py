@@ -15,8 +15,8 @@ import numpy as np
 import zarr
 from matplotlib import rc_context
 
-from conformance.audit.claim import Check
-from conformance.audit.ensemble import (
+from mushrooms.audit.claim import Check
+from mushrooms.audit.ensemble_checks import (
     GivenEnsemble,
     HighEnergies,
     checks,
@@ -26,15 +26,16 @@ from conformance.audit.ensemble import (
     likely_causes,
     reversal,
 )
-from conformance.audit.runs import BoolArray, FloatArray, scene_named
-from conformance.suite.sheet import read_names, read_number, read_rows
+from mushrooms.audit.page import expected_text, figures_text, power_text, pull, to_json
+from mushrooms.audit.runs import BoolArray, FloatArray
 from mushrooms.figures import energies
 from mushrooms.figures.style import ORANGE, SKY, STYLE, new_figure, svg
-from mushrooms.output import writable_folder, write_report
-from mushrooms.reports.audit_page import expected_text, figures_text, power_text, to_json
-from mushrooms.reports.page import embed, pull, render
+from mushrooms.folders import writable_folder
+from mushrooms.output import write_report
+from mushrooms.reports.page import embed, render
 from mushrooms.store.run import GROUP, UNREADABLE, folder_of, open_run
-from mushrooms.tables import check_digest, import_arrow
+from scene.files.tables import check_digest, import_arrow, read_names, read_number, read_rows
+from scene.named import scene_named
 from scene.refusal import BadInput
 from scene.tables import Mushroom
 

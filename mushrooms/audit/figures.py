@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claims.exponents import nu_gap, zone_share
-from conformance.audit.claims.finite_energy import (
+from mushrooms.audit.claims.exponents import nu_gap, zone_share
+from mushrooms.audit.claims.finite_energy import (
     ACW,
     CW,
     DRAWN_SEED,
@@ -30,8 +30,8 @@ from conformance.audit.claims.finite_energy import (
     width,
     zone_energy,
 )
-from conformance.audit.runs import Sample, scene_of
-from conformance.audit.tolerances import Mean, mean, share
+from mushrooms.audit.runs import Sample, scene_of
+from mushrooms.audit.tolerances import Mean, mean, share
 from mushrooms.figures.energies import ROOM, draw, draw_adiabatic, gathered, with_residuals
 from mushrooms.figures.orbits import draw_map, draw_section
 from mushrooms.figures.style import (

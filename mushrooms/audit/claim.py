@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import theory
-from conformance.audit.runs import RUNS, Sample, Simulate, Size, scene_of
+from mushrooms.audit.runs import RUNS, Sample, Simulate, Size, scene_of
 from scene import Scene, load
 
 if TYPE_CHECKING:

@@ -17,9 +17,9 @@ from support.depth import deep_among, deep_but
 
 import fast
 import theory
-from conformance.audit import frozen, tolerances
-from conformance.audit.claim import AuditSteppers, Check, ClaimEvidence, verdict_of
-from conformance.audit.claims import (
+from mushrooms.audit import frozen, tolerances
+from mushrooms.audit.claim import AuditSteppers, Check, ClaimEvidence, verdict_of
+from mushrooms.audit.claims import (
     all_claims,
     assumptions,
     experiments,
@@ -29,16 +29,17 @@ from conformance.audit.claims import (
     misprints,
     select_claims,
 )
-from conformance.audit.frozen import (
+from mushrooms.audit.frozen import (
     MEASURED,
     measured,
     passages,
 )
-from conformance.audit.runs import RUNS, SCENES, Sample, draw, scene_of
-from conformance.audit.session import AuditSettings, conduct
-from conformance.audit.tolerances import MAX_TESTS, N_SIGMA, close, fits, half_unit, power
+from mushrooms.audit.runs import RUNS, Sample, draw, scene_of
+from mushrooms.audit.session import AuditSettings, conduct
+from mushrooms.audit.tolerances import MAX_TESTS, N_SIGMA, close, fits, half_unit, power
 from scene import BangBang, Mushroom, load
 from scene.geometry import table_at
+from scene.named import SCENES
 from theory.finite_energy.rates import MEMORIES, PHASES, Rates, frozen_rates
 
 # They follow single particles, slow ones, flows, other tables or upright ones: not the stand-in's matter.
@@ -63,7 +64,7 @@ def _fewer():
             patch.setattr(module, "N_DRAWN", 100_000)
         patch.setattr(assumptions, "N_CLOCKS", 1)
         for module in ("claim", "claims.misprints", "claims.assumptions"):
-            name = f"conformance.audit.{module}.DIGITS"
+            name = f"mushrooms.audit.{module}.DIGITS"
             patch.setattr(name, adiabatic_particles.DIGITS)  # what is predicted is shared
         yield
         finite_energy.summed.cache_clear()

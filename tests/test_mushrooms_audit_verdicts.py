@@ -9,12 +9,12 @@ from scipy.stats import kstwo, norm
 
 import fast
 import theory
-from conformance.audit import runs
-from conformance.audit.claim import Check, Claim, ClaimEvidence, Finding, from_data, to_data, verdict_of
-from conformance.audit.claims import assumptions, experiments
-from conformance.audit.runs import RUNS, Sample, Simulation, run_seed
-from conformance.audit.session import AuditResult, AuditSettings, examine
-from conformance.audit.tolerances import (
+from mushrooms.audit import runs
+from mushrooms.audit.claim import Check, Claim, ClaimEvidence, Finding, from_data, to_data, verdict_of
+from mushrooms.audit.claims import assumptions, experiments
+from mushrooms.audit.runs import RUNS, Sample, Simulation, run_seed
+from mushrooms.audit.session import AuditResult, AuditSettings, examine
+from mushrooms.audit.tolerances import (
     FAMILY_LEVEL,
     LEVEL,
     MAX_TESTS,

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import ks_1samp, kstwo, norm
 
-from conformance.audit.claim import Check, Form
+from mushrooms.audit.claim import Check, Form
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

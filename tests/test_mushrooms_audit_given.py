@@ -14,9 +14,9 @@ from mpmath import fp
 from support.refusals import one_line
 
 import theory
-from conformance.audit import ensemble as audited
-from conformance.audit.claim import Check
-from conformance.audit.ensemble import (
+from mushrooms.audit import ensemble_checks as audited, ensemble_command
+from mushrooms.audit.claim import Check
+from mushrooms.audit.ensemble_checks import (
     CAPTURED,
     FREE,
     IDENTITY,
@@ -35,8 +35,7 @@ from conformance.audit.ensemble import (
     nu_at,
     reversal,
 )  # fmt: skip
-from mushrooms import audit_ensemble
-from mushrooms.audit_ensemble import EnsembleAudit, Options
+from mushrooms.audit.ensemble_command import EnsembleAudit, Options
 from scene import Fourier, Mushroom, load
 from scene.geometry import table_at
 from scene.laws import value
@@ -351,7 +350,7 @@ def test_the_worst_place_of_the_reversal_identity_counts():
 def read(tmp_path: Path, rows: str, scene: Mushroom = SCENE, **options) -> tuple[GivenEnsemble, list[str]]:
     path = tmp_path / "e.csv"
     path.write_text(rows)
-    return audit_ensemble.read(path, scene, PLAIN._replace(**options))
+    return ensemble_command.read(path, scene, PLAIN._replace(**options))
 
 
 def table(times, energy: float = ENERGY) -> str:
@@ -429,14 +428,14 @@ def test_arrays_of_unequal_lengths_and_folders_without_arrays_are_refused(tmp_pa
     group = zarr.open_group(tmp_path / "e.zarr", mode="w")
     for name, n in (("E0", 3), ("E1", 3), ("t_in", 2)):
         group.create_array(name, data=np.ones(n))
-    line = one_line(audit_ensemble.read, tmp_path / "e.zarr", SCENE, PLAIN)
+    line = one_line(ensemble_command.read, tmp_path / "e.zarr", SCENE, PLAIN)
     assert "arrays of" in line
     assert "'t_in': 2" in line
     assert "must be as many in each" in line
     (tmp_path / "none.zarr").mkdir()
     (tmp_path / "none.zarr" / "zarr.json").write_text("{")
     for name in ("none.zarr", "absent.zarr"):
-        assert "is no Zarr group" in one_line(audit_ensemble.read, tmp_path / name, SCENE, PLAIN)
+        assert "is no Zarr group" in one_line(ensemble_command.read, tmp_path / name, SCENE, PLAIN)
 
 
 def test_a_group_of_zarr_has_cycles_in_columns_and_the_first_of_several_narrowings(tmp_path):
@@ -444,7 +443,7 @@ def test_a_group_of_zarr_has_cycles_in_columns_and_the_first_of_several_narrowin
     group = zarr.open_group(tmp_path / "run" / "ensemble.zarr", mode="w")
     group.create_array("cycle_energies", data=np.array([[2e6, 3e6], [4e6, 5e6]]))
     group.create_array("t_in", data=np.array([[1.0, 9.0], [np.nan, np.nan]]))
-    given, _ = audit_ensemble.read(tmp_path / "run", SCENE, PLAIN._replace(time_unit="scene"))
+    given, _ = ensemble_command.read(tmp_path / "run", SCENE, PLAIN._replace(time_unit="scene"))
     assert given.s == pytest.approx(np.log([2.0, 4.0]))
     assert given.later == pytest.approx(np.log([[3.0], [5.0]]))
     assert given.t_in.tolist() == pytest.approx([1.0, np.nan], nan_ok=True)
@@ -454,7 +453,7 @@ def test_a_group_of_zarr_has_cycles_in_columns_and_the_first_of_several_narrowin
 def test_without_arrow_the_cells_are_read_alike(tmp_path, monkeypatch):
     rows = "E0,E1,captured\n" + "".join(f"1e6,{2e6 + k},{k % 2}\n" for k in range(30))
     before, _ = read(tmp_path, rows)
-    monkeypatch.setattr(audit_ensemble, "FEW", 7)
+    monkeypatch.setattr(ensemble_command, "FEW", 7)
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     after, _ = read(tmp_path, rows)
     assert after.s.tolist() == before.s.tolist()
@@ -471,8 +470,8 @@ def test_the_report_says_how_it_came_to_its_verdict(tmp_path):
     assert result.verdict == "refuted"
     assert EnsembleAudit(RIGHT, found[1:], [], []).verdict == "indeterminate"
     assert EnsembleAudit(RIGHT, found[1:2], [], []).verdict == "confirmed"
-    data = audit_ensemble.to_data(result, tmp_path / "e.csv", "moving-cap")
-    text = audit_ensemble.to_text(data)
+    data = ensemble_command.to_data(result, tmp_path / "e.csv", "moving-cap")
+    text = ensemble_command.to_text(data)
     assert text.startswith(
         f"{tmp_path / 'e.csv'} against moving-cap: refuted\n4,000 particles, 0 without an energy\n"
     )
@@ -482,21 +481,23 @@ def test_the_report_says_how_it_came_to_its_verdict(tmp_path):
     assert "open   a share: 0.30 ± 0.20, must be 0.200; pull +0.5\n" in text
     assert text.endswith("likely cause: none of those that are known\n")
     named = {**data, "causes": ["it leaks"]}
-    assert audit_ensemble.to_text(named).endswith("likely cause: it leaks\n")
+    assert ensemble_command.to_text(named).endswith("likely cause: it leaks\n")
 
 
 def test_where_nothing_is_known_of_an_energy_a_failed_figure_is_open(tmp_path, monkeypatch):
     """What finite energy adds there is a guess: it refutes nothing."""
-    monkeypatch.setattr(audit_ensemble, "checks", lambda *_: [
+    monkeypatch.setattr(ensemble_command, "checks", lambda *_: [
         Check("a guess", False, "0", 1.0, 0.1, 0.02), Check("a fact", False, "0", 1.0, 0.1),
     ])  # fmt: skip
-    monkeypatch.setattr(audit_ensemble, "likely_causes", lambda *_: [])
+    monkeypatch.setattr(ensemble_command, "likely_causes", lambda *_: [])
     (tmp_path / "e.csv").write_text("E0,E1\n1e6,2e6\n1e6,3e6\n")
     for scene, wanted in ((OWN, [None, False]), (SCENE, [False, False])):
-        result = audit_ensemble.examine(tmp_path / "e.csv", scene, None, PLAIN)
+        result = ensemble_command.examine(tmp_path / "e.csv", scene, None, PLAIN)
         assert [check.holds for check in result.checks] == wanted
         assert any("no frozen rates" in note for note in result.notes) is (scene is OWN)
-    both = audit_ensemble.examine(tmp_path / "e.csv", SCENE, tmp_path / "e.csv", PLAIN._replace(particles=2))
+    both = ensemble_command.examine(
+        tmp_path / "e.csv", SCENE, tmp_path / "e.csv", PLAIN._replace(particles=2)
+    )
     assert both.checks[-1].what.startswith("reversal identity")  # of two particles some shares have no error
 
 

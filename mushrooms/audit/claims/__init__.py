@@ -4,8 +4,8 @@ import tomllib
 from functools import cache
 from importlib import resources
 
-from conformance.audit.claim import Claim
-from conformance.audit.claims import (
+from mushrooms.audit.claim import Claim
+from mushrooms.audit.claims import (
     assumptions,
     experiments,
     exponents,
@@ -13,7 +13,7 @@ from conformance.audit.claims import (
     many_cycles,
     misprints,
 )
-from conformance.audit.tolerances import N_SIGMA
+from mushrooms.audit.tolerances import N_SIGMA
 from scene.refusal import BadInput
 
 CHECKS = {
@@ -29,7 +29,7 @@ CHECKS = {
 @cache
 def all_claims() -> tuple[Claim, ...]:
     """Return all claims, in their order."""
-    text = (resources.files("conformance.audit") / "claims.toml").read_text("utf-8")
+    text = (resources.files("mushrooms.audit") / "claims.toml").read_text("utf-8")
     return tuple(
         Claim(
             **data

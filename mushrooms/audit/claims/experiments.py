@@ -6,8 +6,8 @@ from functools import partial
 import numpy as np
 from scipy.stats import ks_2samp, norm, uniform
 
-from conformance.audit.claim import Check, ClaimEvidence
-from conformance.audit.claims.finite_energy import (
+from mushrooms.audit.claim import Check, ClaimEvidence
+from mushrooms.audit.claims.finite_energy import (
     ACW,
     CW,
     ESCAPE,
@@ -22,9 +22,9 @@ from conformance.audit.claims.finite_energy import (
     width,
     width_as_predicted,
 )
-from conformance.audit.claims.misprints import ZERO, loop_area
-from conformance.audit.runs import SCENES, Sample, scene_of
-from conformance.audit.tolerances import (
+from mushrooms.audit.claims.misprints import ZERO, loop_area
+from mushrooms.audit.runs import Sample, scene_of
+from mushrooms.audit.tolerances import (
     LEVEL,
     N_SIGMA,
     above,
@@ -40,6 +40,7 @@ from conformance.audit.tolerances import (
     stated,
 )
 from scene.laws import bounds
+from scene.named import SCENES
 from scene.tables import laws
 
 MOVING = ("moving-cap@1e6", "moving-cap@1e7")

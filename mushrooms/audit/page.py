@@ -4,6 +4,7 @@ docs/report.schema.json defines the fields of report.json.
 """
 
 import json
+import math
 import os
 import platform
 import re
@@ -14,14 +15,15 @@ import numpy as np
 
 import scene as scenes
 import theory
-from conformance.audit.claim import Check, Claim, Finding
-from conformance.audit.claims.finite_energy import predicted
-from conformance.audit.runs import Sample, run_seed, scene_of
-from conformance.audit.session import AuditResult
-from conformance.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, share, spread
 from mushrooms import __version__
-from mushrooms.figures import by_claim, style as plots
-from mushrooms.reports.page import embed, pull, render
+from mushrooms.audit import figures
+from mushrooms.audit.claim import Check, Claim, Finding
+from mushrooms.audit.claims.finite_energy import predicted
+from mushrooms.audit.runs import Sample, run_seed, scene_of
+from mushrooms.audit.session import AuditResult
+from mushrooms.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, share, spread
+from mushrooms.figures import style as plots
+from mushrooms.reports.page import embed, render
 
 PAPER = "https://arxiv.org/abs/1305.2624"
 # First the paper's claims in its order, then its misprints, then what nobody claimed but must hold.
@@ -109,6 +111,17 @@ def _check(check: Check) -> Data:
     return check._asdict() | numbers | {"pull": pull(check)}
 
 
+def pull(check: Check) -> float | None:
+    """Return how many standard errors a value is from the number expected; None where nothing is random."""
+    if check.value is None or not check.error:
+        return None
+    try:
+        found = (check.value - float(check.expected)) / check.error
+    except ValueError:  # it is held against a bound
+        return None
+    return found if math.isfinite(found) and math.isfinite(check.error) else None
+
+
 def _run(sample: Sample, seed: int) -> Data:
     found = mean(sample.gain)
     return {
@@ -144,17 +157,17 @@ def to_json(data: Data) -> str:
     return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def to_html(data: Data, samples: by_claim.Samples) -> str:
+def to_html(data: Data, samples: figures.Samples) -> str:
     """Return report.html's text: no scripts, images embedded, nothing loaded from elsewhere."""
     claims = {finding["id"] for finding in data["findings"]}
-    figures: dict[str, list[dict[str, str]]] = {}
-    for picture in by_claim.ALL:
-        figure = by_claim.draw_picture(picture, samples) if picture.claim in claims else None
+    images: dict[str, list[dict[str, str]]] = {}
+    for picture in figures.ALL:
+        figure = figures.draw_picture(picture, samples) if picture.claim in claims else None
         if figure is not None:
             wide = f"{figure.get_figwidth() * PIXELS_PER_INCH:.0f}px"
             image = {"source": embed(plots.svg(figure)), "caption": picture.caption, "width": wide}
-            figures.setdefault(picture.claim, []).append(image)
-    first = by_claim.draw_picture(by_claim.FIRST, samples)
+            images.setdefault(picture.claim, []).append(image)
+    first = figures.draw_picture(figures.FIRST, samples)
     groups = [
         (title, sorted((f for f in data["findings"] if f["id"][0] in letters), key=_place))
         for title, letters in GROUPS.items()
@@ -165,7 +178,7 @@ def to_html(data: Data, samples: by_claim.Samples) -> str:
         headline=headline(samples),
         first=embed(plots.svg(first)) if first else "",
         groups=groups,
-        images=figures,
+        images=images,
         scenes={run["name"].partition("@")[0]: run["scene"] for run in data["runs"]},
         figures_text=figures_text,
         expected_text=expected_text,
@@ -175,7 +188,7 @@ def to_html(data: Data, samples: by_claim.Samples) -> str:
     )
 
 
-def headline(samples: by_claim.Samples) -> list[Data]:
+def headline(samples: figures.Samples) -> list[Data]:
     """Return the first screen: the paper's main numbers as printed, as predicted and as simulated.
 
     `theory_there` is the limit of infinite energy as printed, `limit` the same by our theory. `predicted` is

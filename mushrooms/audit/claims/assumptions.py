@@ -16,11 +16,11 @@ import numpy as np
 from mpmath import fp
 
 import theory
-from conformance.audit.claim import DIGITS, Check, ClaimEvidence
-from conformance.audit.claims.experiments import one_cycle
-from conformance.audit.claims.finite_energy import ACW
-from conformance.audit.runs import RUNS, Sample, run_seed, scene_of
-from conformance.audit.tolerances import Cdf, FloatArray, Mean, close, exact, fits, mean, share, stated
+from mushrooms.audit.claim import DIGITS, Check, ClaimEvidence
+from mushrooms.audit.claims.experiments import one_cycle
+from mushrooms.audit.claims.finite_energy import ACW
+from mushrooms.audit.runs import RUNS, Sample, run_seed, scene_of
+from mushrooms.audit.tolerances import Cdf, FloatArray, Mean, close, exact, fits, mean, share, stated
 from scene import BangBang, Horizon, Mushroom, Scene, State, load
 from scene.geometry import table_at
 from scene.laws import bounds

@@ -14,7 +14,7 @@ kicks is seen, each wall in proportion to its speed there. At speed 1 that gives
   cap for less long than one at rest.
 
 All are of tables at rest: nothing is taken from a moving one, or fitted to it. `theory.finite_energy` reads
-them, `theory/equations.md` says what follows. `python -m conformance.audit.frozen` measures them anew.
+them, `theory/equations.md` says what follows. `python -m mushrooms.audit.frozen` measures them anew.
 """
 
 import json
@@ -29,13 +29,13 @@ from scipy.optimize import nnls
 
 import fast
 import scene as scenes
-from conformance.audit.runs import scene_named
-from conformance.audit.tolerances import FloatArray, Mean, mean
-from conformance.files import write_file
 from fast.paths import carry
+from mushrooms.audit.tolerances import FloatArray, Mean, mean
 from scene import Fourier, Horizon, Mushroom, State
+from scene.files.writer import write_file
 from scene.geometry import TableAt, table_at
 from scene.laws import value
+from scene.named import scene_named
 from scene.tables import laws
 from theory.finite_energy.rates import FILE, MEMORIES, N_PHASES, PHASES, SPEEDS, Rates, kick_rates, pace
 from theory.volumes import volumes_at
@@ -309,7 +309,7 @@ def main(names: Sequence[str] = ()) -> None:
         n = FINER.get(name, 1.0)
         kept = {key: short(column).tolist() for key, column in measured(scene, n=n)._asdict().items()}
         text = {
-            "command": "python -m conformance.audit.frozen",
+            "command": "python -m mushrooms.audit.frozen",
             "seed": SEED,
             "scenes": {
                 **json.loads(FILE.read_text("utf-8"))["scenes"],

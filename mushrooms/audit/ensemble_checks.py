@@ -23,11 +23,11 @@ from scipy.special import ndtr
 from scipy.stats import ks_1samp
 
 import theory
-from conformance.audit.claim import Check
-from conformance.audit.claims.assumptions import walls_speed
-from conformance.audit.claims.finite_energy import DRAWN_SEED, PEAK_DENSITY, Sums, peak_band
-from conformance.audit.runs import MAX_LOST, BoolArray, FloatArray
-from conformance.audit.tolerances import (
+from mushrooms.audit.claim import Check
+from mushrooms.audit.claims.assumptions import walls_speed
+from mushrooms.audit.claims.finite_energy import DRAWN_SEED, PEAK_DENSITY, Sums, peak_band
+from mushrooms.audit.runs import MAX_LOST, BoolArray, FloatArray
+from mushrooms.audit.tolerances import (
     N_SIGMA,
     Cdf,
     close,

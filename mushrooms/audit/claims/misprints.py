@@ -15,10 +15,10 @@ from mpmath import fp
 
 import scene as scenes
 import theory
-from conformance.audit.claim import DIGITS, Check, ClaimEvidence, Form
-from conformance.audit.claims.finite_energy import Figure, captured_change, less_bias
-from conformance.audit.runs import scene_of
-from conformance.audit.tolerances import close, exact, half_unit, mean, stated
+from mushrooms.audit.claim import DIGITS, Check, ClaimEvidence, Form
+from mushrooms.audit.claims.finite_energy import Figure, captured_change, less_bias
+from mushrooms.audit.runs import scene_of
+from mushrooms.audit.tolerances import close, exact, half_unit, mean, stated
 from scene import State
 from scene.geometry import table_at
 from scene.laws import bounds, value

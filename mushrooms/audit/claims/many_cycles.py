@@ -10,8 +10,8 @@ from scipy.stats import chi2, ncx2, norm
 
 import theory
 from conformance import profiles
-from conformance.audit.claim import Check, ClaimEvidence
-from conformance.audit.claims.finite_energy import (
+from mushrooms.audit.claim import Check, ClaimEvidence
+from mushrooms.audit.claims.finite_energy import (
     DRAWN_SEED,
     N_DRAWN,
     PEAK_DENSITY,
@@ -19,8 +19,8 @@ from conformance.audit.claims.finite_energy import (
     predicted,
     summed,
 )
-from conformance.audit.runs import RUNS, Sample, run_seed, scene_of
-from conformance.audit.tolerances import (
+from mushrooms.audit.runs import RUNS, Sample, run_seed, scene_of
+from mushrooms.audit.tolerances import (
     LEVEL,
     N_SIGMA,
     FloatArray,

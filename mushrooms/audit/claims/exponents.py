@@ -15,9 +15,9 @@ import numpy as np
 from mpmath import fp
 
 import theory
-from conformance.audit.claim import Check, ClaimEvidence
-from conformance.audit.claims.experiments import chord_time
-from conformance.audit.claims.finite_energy import (
+from mushrooms.audit.claim import Check, ClaimEvidence
+from mushrooms.audit.claims.experiments import chord_time
+from mushrooms.audit.claims.finite_energy import (
     ACW,
     ERGODIC,
     FIXED,
@@ -29,8 +29,8 @@ from conformance.audit.claims.finite_energy import (
     share_in_the_zone,
     zone_energy,
 )
-from conformance.audit.runs import RUNS, Sample, run_seed, scene_of
-from conformance.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
+from mushrooms.audit.runs import RUNS, Sample, run_seed, scene_of
+from mushrooms.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
 from scene import Scene, State, load
 from scene.geometry import area, table_at
 from scene.laws import bounds, values

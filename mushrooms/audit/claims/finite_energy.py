@@ -14,9 +14,9 @@ import numpy as np
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claim import Check, ClaimEvidence, Form
-from conformance.audit.runs import RUNS, Sample, scene_of
-from conformance.audit.tolerances import (
+from mushrooms.audit.claim import Check, ClaimEvidence, Form
+from mushrooms.audit.runs import RUNS, Sample, scene_of
+from mushrooms.audit.tolerances import (
     N_SIGMA,
     Cdf,
     FloatArray,

@@ -10,28 +10,23 @@ from functools import cache, partial
 from pathlib import Path
 
 import fast
-from conformance.audit import session
-from conformance.audit.claim import AuditSteppers, Claim
-from conformance.audit.claims import all_claims, select_claims
-from conformance.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
-from conformance.audit.session import AuditResult, AuditSettings
-from conformance.files import named
 from fast.ensemble import SHARE
-from mushrooms.audit_ensemble import Options, audit_ensemble
-from mushrooms.output import (
-    Watch,
-    announce_compilation,
-    locked,
-    progress_bar,
-    refuse_unheeded,
-    writable_folder,
-    write_report,
-)
-from mushrooms.reports import audit_page
+from mushrooms.audit import session
+from mushrooms.audit.claim import AuditSteppers, Claim
+from mushrooms.audit.claims import all_claims, select_claims
+from mushrooms.audit.ensemble_command import Options, audit_ensemble
+from mushrooms.audit.page import to_data, to_html, to_json, to_text
+from mushrooms.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
+from mushrooms.audit.session import AuditResult, AuditSettings
+from mushrooms.folders import locked, writable_folder
+from mushrooms.output import write_report
+from mushrooms.progress import Watch, announce_compilation, progress_bar
 from mushrooms.store import conduct
 from mushrooms.store.run import is_run
 from mushrooms.store.spec import RunSpec
 from scene import BadInput, Scene
+from scene.files.writer import named
+from scene.refusal import refuse_unheeded
 
 
 def audit_claims(
@@ -104,9 +99,9 @@ def _audit_paper(
         for path in (*folder.glob(".report.*.part"), *folder.glob("findings/.*.finding.*.part")):
             path.unlink(missing_ok=True)
         result = _conduct(folder, settings, claims)
-        data = audit_page.to_data(result)
-        page = audit_page.to_html(data, result.samples)
-        write_report(folder, audit_page.to_json(data), audit_page.to_text(data), page, as_json)
+        data = to_data(result)
+        page = to_html(data, result.samples)
+        write_report(folder, to_json(data), to_text(data), page, as_json)
     return 0 if result.is_passed else 1
 
 

@@ -8,19 +8,19 @@ import csv
 import hashlib
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import scene as scenes
-from conformance.files import write_files
-from mushrooms import __version__
-from scene import BadInput, Scene
+from scene.files.writer import write_files
+from scene.refusal import BadInput, shown
 
 SUFFIXES = (".csv", ".parquet")
 METADATA = "-metadata.json"  # after the name of a CSV file
+SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 Tables = Iterable[Mapping[str, Any]]
 
 
@@ -49,12 +49,6 @@ def write_table(path: Path, tables: Tables, about: Mapping[str, Any]) -> None:
         path.parent,
         {path.name: partial(_write_csv, tables, digest.update), metadata_of(path).name: write_metadata},
     )
-
-
-def describe(scene: Scene, *, energy: float, seed: int | None) -> dict[str, Any]:
-    """Return what goes with a table of particles: the scene, their initial energy, seed and version."""
-    found = {"version": __version__, "scene": scenes.to_data(scene), "energy": energy}
-    return found if seed is None else {**found, "seed": seed}
 
 
 def metadata_of(path: Path) -> Path:
@@ -102,6 +96,71 @@ def import_arrow() -> tuple[Any, Any]:
     return pyarrow, pyarrow.parquet
 
 
+def read_rows(
+    path: Path, label: str, needed: Sequence[str], known: Sequence[str] | None = None
+) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield the rows of a CSV file by the names of its columns, each with its place; # begins a comment.
+
+    Args:
+        path: of the file.
+        label: what messages begin with.
+        needed: columns that must be there.
+        known: columns that there may be; None for any.
+
+    Raises:
+        BadInput: naming the column, or the place.
+    """
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        reader = csv.reader(file)
+        rows = (row for row in reader if any(map(str.strip, row)) and not row[0].startswith("#"))
+        try:
+            names = _names(next(rows, []), label)
+            lacking = [name for name in needed if name not in names]
+            twice = [name for i, name in enumerate(names) if name in names[:i]]
+            unknown = [name for name in names if known and name not in known]
+            for fault, found in (("is missing", lacking), ("stands twice", twice), ("is unknown", unknown)):
+                if found:
+                    which = f"; columns are {', '.join(known)}" if known else ""
+                    raise BadInput(f"{label}: column {shown(found[0])} {fault}{which}")
+            for row in rows:
+                place = f"{label}:{reader.line_num}"
+                if len(row) != len(names):
+                    raise BadInput(f"{place}: {_miscounted(row, names)}")
+                yield place, dict(zip(names, map(str.strip, row), strict=True))
+        except (csv.Error, UnicodeDecodeError) as error:
+            raise _unreadable(label, reader.line_num, error) from None
+
+
+def read_names(path: Path, label: str) -> list[str]:
+    """Return the names of the columns of a CSV file, from its first line.
+
+    Raises:
+        BadInput: it is no CSV file with commas.
+    """
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        try:
+            return _names(next(csv.reader(file), []), label)
+        except (csv.Error, UnicodeDecodeError) as error:
+            raise _unreadable(label, 1, error) from None
+
+
+def read_number(place: str, name: str, text: str) -> float:
+    """Return a number written in decimal, with Fortran's D, or hexadecimal with p.
+
+    Raises:
+        BadInput: it is none, or not finite.
+    """
+    try:
+        word = text.lower()
+        number = float.fromhex(word) if "0x" in word else float(word.replace("d", "e"))
+    except (ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        how = "with a decimal point" if "," in text else "decimal or as 0x1.8p+3"
+        raise BadInput(f"{place}: {name} = {shown(text)}, must be a finite number, {how}")
+    return number
+
+
 def _write_csv(tables: Tables, note: Callable[[bytes], object], file: BinaryIO) -> None:
     """Write CSV, whose numbers read back to the same bits; `note` receives each piece as it is written."""
     for number, columns in enumerate(tables):
@@ -127,3 +186,26 @@ def _write_parquet(tables: Tables, about: Mapping[str, Any], file: BinaryIO) -> 
     with parquet.ParquetWriter(file, schema, write_page_checksum=True) as writer:
         for part in chain([first], parts):
             writer.write_table(part.cast(schema))
+
+
+def _unreadable(label: str, line: int, error: Exception) -> BadInput:
+    why = "it is no UTF-8" if isinstance(error, UnicodeDecodeError) else error
+    return BadInput(f"{label}:{line}: {why}")
+
+
+def _names(row: Sequence[str], label: str) -> list[str]:
+    """Return the names in a first row; of one that nothing separates refuse another separator by its name."""
+    names = [name.strip() for name in row]
+    if len(names) == 1:
+        for mark, word in SEPARATORS.items():
+            if mark in names[0]:
+                raise BadInput(f"{label}: its columns are separated by {word}, must be by commas")
+    return names
+
+
+def _miscounted(row: Sequence[str], names: Sequence[str]) -> str:
+    """Say that a row has too many or too few cells, and what makes twice as many."""
+    said = f"{len(row)} cells, must be {len(names)} as in the first row"
+    n_whole = sum(cell.strip().lstrip("+-").isdigit() for cell in row)
+    is_decimal_comma = len(row) > len(names) and 2 * n_whole > len(row)
+    return f"{said}; numbers must have a decimal point, no comma" if is_decimal_comma else said

@@ -64,19 +64,20 @@ def test_the_record_has_a_field_for_each_option_and_is_frozen(name):
 
 
 HEAD = 'def draw(scene, out):\n    """Draw."""\n    from mushrooms.draw import DrawOptions, draw_scene\n'
+MADE = "    options = DrawOptions(scene=scene, out=out)\n"
+HANDED = "    draw_scene(options)"
 FAULTY = {
-    "two options exchanged": "    options = DrawOptions(scene=out, out=scene)\n    draw_scene(options)",
-    "an option left out": "    options = DrawOptions(scene=scene)\n    draw_scene(options)",
-    "another order": "    options = DrawOptions(out=out, scene=scene)\n    draw_scene(options)",
-    "work of its own": "    print(1)\n    options = DrawOptions(scene=scene, out=out)\n    draw_scene(options)",
-    "a changed option": "    options = DrawOptions(scene=scene, out=out or 1)\n    draw_scene(options)",
-    "an option beside it": "    options = DrawOptions(scene=scene, out=out)\n    draw_scene(options, out)",
+    "two options exchanged": "    options = DrawOptions(scene=out, out=scene)\n" + HANDED,
+    "an option left out": "    options = DrawOptions(scene=scene)\n" + HANDED,
+    "another order": "    options = DrawOptions(out=out, scene=scene)\n" + HANDED,
+    "work of its own": "    print(scene)\n" + MADE + HANDED,
+    "a changed option": "    options = DrawOptions(scene=scene, out=out or 1)\n" + HANDED,
+    "an option beside it": MADE + "    draw_scene(options, out)",
     "no record": "    draw_scene(scene, out)",
 }
 
 
 @pytest.mark.parametrize("body", FAULTY.values(), ids=FAULTY)
 def test_a_faulty_command_would_be_seen(body):
-    right = "    options = DrawOptions(scene=scene, out=out)\n    draw_scene(options)"
-    assert faults(HEAD + right) == []
+    assert faults(HEAD + MADE + HANDED) == []
     assert faults(HEAD + body) != []

@@ -56,7 +56,7 @@ def print_scenes(options: ScenesOptions) -> None:
 def _one_scene(name: str, as_json: bool) -> str:
     """Return a scene of the catalogue or of the audit as TOML or JSON."""
     of_audit = scenes.to_data(SCENES[name]) if name in SCENES else None
-    if options.as_json:
+    if as_json:
         return json.dumps(of_audit or read_data(name), indent=2, ensure_ascii=False)
     return (_toml(of_audit) if of_audit else catalogue_text(name)).rstrip("\n")
 

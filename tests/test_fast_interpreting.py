@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +12,12 @@ from numba import config
 from support import fuzz
 
 from conformance import vectors
-from fast.__main__ import answers_to
-from fast.kernel import arithmetic, interpreting, path, single
+import fast
+from fast import __main__ as server
+from fast.kernel import interpreting, path, single
+from fast.kernel.interpreting import MOST_STEPS, Allowance
+from scene import State, load
+from support.faulty_steppers import answers_to
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="without the compiler Python runs every step")
 ROOT = Path(__file__).parent.parent
@@ -30,7 +33,8 @@ def answered(lines: list[bytes], monkeypatch: pytest.MonkeyPatch, n_by_python: i
         patch.setattr(interpreting, "is_at_hand", lambda _: False)
         for allowance in (single.allowance, *path.ALLOWANCES.values()):
             patch.setattr(allowance, "left", n_by_python)
-        return [answers_to([line]) for line in lines]
+        given = {"follow": server.follow, "flow": server.carry, "timer": server.clock}
+        return [answers_to([line], step=fast.next_collision, **given) for line in lines]
 
 
 @pytest.mark.parametrize("lines", [CORPUS, NASTY], ids=["corpus", "nasty"])
@@ -49,12 +53,41 @@ def test_a_product_that_is_rounded_twice_is_seen(monkeypatch):
 
 
 FIRST = """
+import json, os, sys
 import fast
-from fast.kernel import interpreting
-from fast.kernel.numba_internals import is_loaded
+from fast.kernel import interpreting, path, scalar_step, single
 from scene import State, load
-interpreting.MOST_STEPS
 scene, state = load("moving-cap"), State(0.0, 0.1, 0.5, 1.0, 3.0)
-print(fast.next_collision(scene, state, 9.0).wall, *fast.trajectory(scene, state, 20).walls[:3])
-from numba.core import event
+walls = [fast.next_collision(scene, state, 9.0).wall, *fast.trajectory(scene, state, 20).walls]
+entries = [scalar_step.scalar_step, single.single, *path.PATHS.values()]
+print(json.dumps([walls, sum(len(entry.signatures) for entry in entries)]))
 """
+
+
+def test_the_first_questions_compile_nothing(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-W", "error", "-c", FIRST]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    walls, n_compiled = json.loads(done.stdout)
+    assert n_compiled == 0
+    assert list(tmp_path.rglob("*.nbi")) == []
+    scene, state = load("moving-cap"), State(0.0, 0.1, 0.5, 1.0, 3.0)
+    assert walls[0] == walls[1]
+    assert walls[1:] == fast.trajectory(scene, state, 20).walls
+
+
+def test_python_runs_no_more_steps_than_are_worth_the_wait(monkeypatch):
+    allowance = Allowance()
+    monkeypatch.setattr(interpreting, "is_at_hand", lambda _: False)
+    assert allowance.take(MOST_STEPS, single.single)
+    assert not allowance.take(1, single.single)
+    another = Allowance()
+    assert not another.take(MOST_STEPS + 1, single.single)
+    assert not another.take(1, single.single)
+
+
+def test_what_is_compiled_before_is_taken(monkeypatch):
+    allowance = Allowance()
+    monkeypatch.setattr(interpreting, "is_at_hand", lambda _: True)
+    assert not allowance.take(1, single.single)
+    assert allowance.left == 0

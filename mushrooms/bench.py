@@ -130,6 +130,7 @@ def _measure(size: Size, seed: int, command: Sequence[str]) -> Record:
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
+            fast.warm(workload.scene)  # what is measured is compiled code
             found, failures = solvers.measure(workload, running, effort, tick)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in failures.items()}

@@ -7,24 +7,27 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from numba import config
-from support import fuzz
+from support.faulty_steppers import answers_to
 
-from conformance import vectors
 import fast
+from conformance import vectors
 from fast import __main__ as server
 from fast.kernel import interpreting, path, single
 from fast.kernel.interpreting import MOST_STEPS, Allowance
-from scene import State, load
-from support.faulty_steppers import answers_to
+from scene import State, load, to_data
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="without the compiler Python runs every step")
 ROOT = Path(__file__).parent.parent
+START = State(0.0, 0.1, -0.5, 1.0, 3.0)
 
-VECTORS = [*vectors.load("core")[::30], *vectors.load("extended")[::30], *vectors.load("stress")[::6]]
-CORPUS = [json.dumps(vectors.request(vector, seq)).encode() for seq, vector in enumerate(VECTORS)]
-NASTY = list(fuzz.lines(3, 200, fuzz.requests))
+VECTORS = [*vectors.load("core")[::20], *vectors.load("extended")[::20], *vectors.load("stress")[::4]]
+STEPS = [vector for vector in VECTORS if vector.kind == "step"]
+CORPUS = [json.dumps(vectors.request(vector, seq)).encode() for seq, vector in enumerate(STEPS)]
+PATH = {"cmd": "trajectory", "seq": 1, "collisions": 60, "state": msgspec.to_builtins(START)}
+PATHS = [json.dumps({**PATH, "scene": to_data(load(name))}).encode() for name in ("moving-cap", "fermi-ulam")]
 
 
 def answered(lines: list[bytes], monkeypatch: pytest.MonkeyPatch, n_by_python: int) -> list[Any]:
@@ -37,7 +40,7 @@ def answered(lines: list[bytes], monkeypatch: pytest.MonkeyPatch, n_by_python: i
         return [answers_to([line], step=fast.next_collision, **given) for line in lines]
 
 
-@pytest.mark.parametrize("lines", [CORPUS, NASTY], ids=["corpus", "nasty"])
+@pytest.mark.parametrize("lines", [CORPUS, PATHS], ids=["steps", "paths"])
 def test_python_gives_the_bits_of_compiled_code(lines, monkeypatch):
     assert answered(lines, monkeypatch, 10**6) == answered(lines, monkeypatch, 0)
 
@@ -56,7 +59,7 @@ FIRST = """
 import json, os, sys
 import fast
 from fast.kernel import interpreting, path, scalar_step, single
-from scene import State, load
+from scene import State, load, to_data
 scene, state = load("moving-cap"), State(0.0, 0.1, 0.5, 1.0, 3.0)
 walls = [fast.next_collision(scene, state, 9.0).wall, *fast.trajectory(scene, state, 20).walls]
 entries = [scalar_step.scalar_step, single.single, *path.PATHS.values()]

@@ -6,6 +6,8 @@ with branches, and `fly_alone` tells `land` in each branch which wall is met, so
 what the others ask for.
 """
 
+from typing import Any
+
 import numpy as np
 
 from fast.kernel.arithmetic import fma
@@ -155,7 +157,7 @@ PATHS = {(moves, form): _path(moves, form) for moves in (False, True) for form i
 ALLOWANCES = {key: Allowance() for key in PATHS}
 
 
-def path_kernel(is_slope_moving, form, n_collisions):
+def path_kernel(is_slope_moving: bool, form: int, n_collisions: int) -> tuple[Any, Any]:
     """Return what follows a path of so many collisions at most, and the scalar step for its worker."""
     key = is_slope_moving, form
     kernel, allowance = PATHS[key], ALLOWANCES[key]

@@ -31,7 +31,7 @@ LARGEST_FLOAT = float(np.finfo(np.float64).max)
 
 
 @in_kernels(times_power)
-def _ldexp(number, exponent):
+def _ldexp(number: Any, exponent: Any) -> Any:
     # C has infinity where Python's own ldexp raises.
     return lambda number, exponent: math.ldexp(number, exponent)
 
@@ -181,7 +181,7 @@ def asking() -> tuple[Any, Any]:
 def share_off_wall(scene: Compiled, particle: Particle) -> float:
     """Return what `off_wall` does."""
     if allowance.left and allowance.take(1, off_wall, scalar_step):
-        exact = Particle(*map(np.float64, particle[:6]), particle.wall)
+        exact = Particle._make([*map(np.float64, particle[:6]), particle.wall])
         with np.errstate(all="ignore"):
             return float(as_python(off_wall)(as_python(scalar_step), scene, exact))
     return float(off_wall(careful_at(), scene, particle))

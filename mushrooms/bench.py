@@ -6,7 +6,9 @@ Our steppers are among the solvers that are measured, and the proofs are what al
 import math
 import tempfile
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.markup import escape
@@ -58,18 +60,39 @@ LANES_SERVE = (
 )  # fmt: skip
 
 
-def measure_solvers(
-    command: list[str], out: Path, quick: bool, seed: int, table: Path | None, workload: str | None
-) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchOptions:
+    """The options of `mushrooms bench`.
+
+    Attributes:
+        command: program and arguments of another stepper to measure.
+        out: folder for the results.
+        quick: fewer questions and runs.
+        seed: of the questions.
+        table: an earlier bench.json, of which a table is printed.
+        workload: of the table; None for the headline's.
+    """
+
+    command: Sequence[str] | None
+    out: Path
+    quick: bool
+    seed: int
+    table: Path | None
+    workload: str | None
+
+
+def measure_solvers(options: BenchOptions) -> None:
     """Measure speed against error and write it into a folder; or print a table of an earlier benchmark."""
-    if table is not None:
-        refuse_unheeded({"--quick": quick or None, "COMMAND": command or None}, "--table measures nothing")
-        print(bench_page.to_markdown(record.read(table), workload or bench_page.HEADLINE), end="")
+    if options.table is not None:
+        measuring = {"--quick": options.quick or None, "COMMAND": options.command or None}
+        refuse_unheeded(measuring, "--table measures nothing")
+        earlier = record.read(options.table)
+        print(bench_page.to_markdown(earlier, options.workload or bench_page.HEADLINE), end="")
         return
-    refuse_unheeded({"--workload": workload}, "it needs --table")
-    size: Size = "quick" if quick else "full"
-    with writable_folder(out) as folder, announce_compilation():
-        found = _measure(size, seed, command)
+    refuse_unheeded({"--workload": options.workload}, "it needs --table")
+    size: Size = "quick" if options.quick else "full"
+    with writable_folder(options.out) as folder, announce_compilation():
+        found = _measure(size, options.seed, options.command or [])
         picture = style.svg(bench_page.headline(found))
         write_files(
             folder,
@@ -86,7 +109,7 @@ def measure_solvers(
     print(f"{found.seconds:.0f} s. Report: {folder / 'bench.html'}")
 
 
-def _measure(size: Size, seed: int, command: list[str]) -> Record:
+def _measure(size: Size, seed: int, command: Sequence[str]) -> Record:
     """Run everything."""
     begin = time.monotonic()
     n_questions = QUESTIONS[size]
@@ -132,7 +155,7 @@ def _measure(size: Size, seed: int, command: list[str]) -> Record:
     )
 
 
-def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
+def _solvers(stack: ExitStack, command: Sequence[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
     """Return solvers, what was compiled, and what cannot run."""
     limits = Limits(TIMEOUT, RESTARTS)
     found = [*our_solvers(), *baselines.in_python()]

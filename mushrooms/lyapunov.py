@@ -21,7 +21,7 @@ import numpy as np
 
 from mushrooms.orbits import FollowedOrbit
 from scene import BadInput, Undecided
-from scene.laws import FloatArray
+from scene.pieces import FloatArray
 
 N_BLOCKS = 16
 DIGITS = 16

@@ -30,8 +30,9 @@ from mushrooms.folders import check_file
 from scene import Outcome, Scene, State, Stem, Wall, check_scene
 from scene.files.tables import SUFFIXES, write_table
 from scene.geometry import TableAt, table_at
-from scene.laws import FloatArray, is_constant, values
+from scene.laws import is_constant, values
 from scene.mouth import start_time
+from scene.pieces import FloatArray
 from scene.refusal import BadInput, check_count, check_number, check_seed
 
 BoolArray = npt.NDArray[np.bool_]

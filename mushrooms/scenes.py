@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+from dataclasses import dataclass
 from typing import Any
 
 from rich.table import Column, Table
@@ -17,17 +18,33 @@ from scene.load import catalogue_text, read_data
 from scene.named import SCENES, scene_named
 
 
-def print_scenes(name: str, as_toml: bool, as_json: bool) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenesOptions:
+    """The options of `mushrooms scenes`.
+
+    Attributes:
+        name: of a scene; empty for all of the catalogue.
+        as_toml: print it as a scene file.
+        as_json: print JSON.
+    """
+
+    name: str
+    as_toml: bool
+    as_json: bool
+
+
+def print_scenes(options: ScenesOptions) -> None:
     """Print the catalogue, or one scene of it or of the audit."""
-    if as_toml and as_json:
+    name = options.name
+    if options.as_toml and options.as_json:
         raise BadInput("--toml and --json: must be one of them")
-    if as_toml and not name:
+    if options.as_toml and not name:
         raise BadInput(f"--toml needs NAME, one of {', '.join(scenes.catalogue())}")
     if name:
-        print(_one_scene(name, as_json))
+        print(_one_scene(name, options.as_json))
         return
     rows = [_catalogue_row(each) for each in scenes.catalogue()]
-    if as_json:
+    if options.as_json:
         print(json.dumps(rows, indent=2, ensure_ascii=False))
         return
     table = Table(Column("name", no_wrap=True), "table", "period", "notes", title="Catalogue")
@@ -97,18 +114,37 @@ FIGURES = {
 }
 
 
-def print_prediction(scene: str, digits: int, energy: float | None, as_json: bool) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TheoryOptions:
+    """The options of `mushrooms theory`.
+
+    Attributes:
+        scene: a name or a file.
+        digits: correct digits.
+        energy: initial energy to predict for, too; None for none.
+        as_json: print JSON.
+    """
+
+    scene: str
+    digits: int
+    energy: float | None
+    as_json: bool
+
+
+def print_prediction(options: TheoryOptions) -> None:
     """Print what the theory predicts for one cycle, and at an energy if one is given."""
-    found = scene_named(scene)
+    found = scene_named(options.scene)
     with progress_bar() as bar:
         task = bar.add_task("resolution 1 of two or more", total=100)
 
         def advance(number: int, share: float) -> None:
             bar.update(task, completed=round(100 * share), description=f"resolution {number} of two or more")
 
-        pairs: dict[str, Any] = dict(theory.predict(found, digits, progress=advance).strings(digits))
-    pairs |= _at_energy(found, energy) if energy is not None else {}
-    print_pairs(pairs, as_json, FIGURES)
+        predicted = theory.predict(found, options.digits, progress=advance)
+    pairs: dict[str, Any] = dict(predicted.strings(options.digits))
+    if options.energy is not None:
+        pairs |= _at_energy(found, options.energy)
+    print_pairs(pairs, options.as_json, FIGURES)
 
 
 def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:

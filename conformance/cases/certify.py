@@ -44,6 +44,7 @@ from conformance.vectors import (
 )
 from conformance.verify import Verdict, verify_line
 from reference.arithmetic import Arithmetic, Interval, rational, sign
+from reference.prepared import prepare
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import (
     BadInput,
@@ -470,7 +471,7 @@ def _is_captured(scene: Mushroom, step: reference.Collision) -> bool:
 
     x, y, vx, vy = (interval(getattr(departure, name)) for name in ("x", "y", "vx", "vy"))
     flight = EnclosedFlight(departure.instant, x, y, vx, vy, interval(departure.begin))
-    width = MovingWalls(arithmetic, scene, flight).width(interval(step.root)).f
+    width = MovingWalls(arithmetic, prepare(scene), flight).width(interval(step.root)).f
     spin = arithmetic.square(x * vy - y * vx)
     found = sign(spin - arithmetic.square(width) * (arithmetic.square(vx) + arithmetic.square(vy)))
     if not found:

@@ -25,7 +25,7 @@ from conformance.cases.scenes import (
     scene,
     state,
 )
-from scene import BangBang, Cap, Collision, Fourier, Law, Mushroom, Scene, State, Stem, Wall
+from scene import BangBang, Cap, Collision, Fourier, GivenLaw, Mushroom, Scene, State, Stem, Wall
 from scene.laws import value
 from scene.tables import laws
 from scene.transforms import scaled, scaled_state
@@ -43,7 +43,7 @@ def at_or_next_to(draw: Draw, t: float) -> float:
     return math.nextafter(t, draw.pick((t, t, math.inf, -math.inf)))
 
 
-def moved(draw: Draw, size: float, at: float) -> Law:
+def moved(draw: Draw, size: float, at: float) -> GivenLaw:
     """Draw a law that is `size` at time `at`, at rest then or half way down a leg.
 
     Sometimes a number.
@@ -192,7 +192,7 @@ def across_a_knot(draw: Draw) -> Question:
     law = many_legs(draw, 0.6, 2.0, period, draw.pick((3, 4, 5)))
     (t0, _), (t1, _) = law.knots[0:2]
     t = period * draw.pick((0, 0, 1, 100, 1000)) + t1 - (t1 - t0) * 10.0 ** -draw.between(0.5, 6.0)
-    sizes: dict[str, Law] = {"r": 4.0, "h": 1.0, "w": 0.3, which: law}
+    sizes: dict[str, GivenLaw] = {"r": 4.0, "h": 1.0, "w": 0.3, which: law}
     walls: dict[str, Wall] = {"r": "arc", "h": "floor", "w": draw.pick(SIDES)}
     wall = walls[which]
     of = Mushroom(**sizes)  # type: ignore[arg-type]
@@ -221,7 +221,7 @@ def tiny_slope(draw: Draw) -> Question:
     back = 2 - t
     first, last = draw.pick(((lean, 0.0), (0.0, lean), (lean, -lean)))
     vanishing = BangBang(knots=((0.0, first), (draw.pick((back, 1.0)), last), (2.0, first)))
-    slopes: tuple[Law, ...] = lean, vanishing
+    slopes: tuple[GivenLaw, ...] = lean, vanishing
     slope = draw.pick(slopes)
     y = -speed * (2 - 2 * t) if speed and draw.pick((True, False)) else -1.5
     tables: tuple[Scene, ...] = (

@@ -53,7 +53,7 @@ from conformance.cases.scenes import (
     when,
 )
 from conformance.plain.step import Flight
-from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall
+from scene import BangBang, Cap, Fourier, GivenLaw, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded
 from scene.laws import MAX_KNOTS, bounds, is_constant
 from scene.transforms import scaled, scaled_law, scaled_state
@@ -186,7 +186,7 @@ def vibrating(table: str, draw: Draw) -> Question:
     shared = clock(draw, MOVING)
     part = draw.power(-12, -8)
 
-    def moving() -> Law:
+    def moving() -> GivenLaw:
         size = draw.short(0.5, 2.0)
         return law(draw, size * (1.0 - part), size * (1.0 + part), shared)
 
@@ -256,7 +256,7 @@ class Swing(NamedTuple):
     `law(low, high)` is low at the time `least`, and fastest after `fast`.
     """
 
-    law: Callable[[float, float], Law]
+    law: Callable[[float, float], GivenLaw]
     least: float
     fast: float
     length: float
@@ -269,10 +269,10 @@ def swing(draw: Draw, kind: str) -> Swing:
     first = length * (quarter / 4 + draw.pick((0, 0, -1, 5)))
     turn = length * (draw.pick((0.5, 0.25, 0.75)) if kind == "bang-bang" else 0.5)
 
-    def legs(low: float, high: float) -> Law:
+    def legs(low: float, high: float) -> GivenLaw:
         return BangBang(knots=((first, low), (first + turn, high), (first + length, low)))
 
-    def harmonic(low: float, high: float) -> Law:
+    def harmonic(low: float, high: float) -> GivenLaw:
         half = (low - high) / 2 if quarter < 2 else (high - low) / 2
         cos, sin = ((), (half,)) if quarter % 2 else ((half,), ())
         return Fourier(mean=(low + high) / 2, period=length, cos=cos, sin=sin)
@@ -286,7 +286,7 @@ def bend(term: Term, kind: str, draw: Draw) -> Question:
     wall = draw.pick(term.walls)
     motion = swing(draw, kind)
 
-    def law(name: str) -> Law:
+    def law(name: str) -> GivenLaw:
         size = draw.short(0.6, 0.9)
         return motion.law(size * draw.power(-6, -4), size) if name in term.moving else size
 

@@ -23,7 +23,7 @@ from scene import (
     BangBang,
     Cap,
     Fourier,
-    Law,
+    GivenLaw,
     Mushroom,
     Scene,
     State,
@@ -77,7 +77,7 @@ def clock(draw: Draw, kinds: Sequence[str] = ("fourier", "bang-bang", "constant"
     return Clock(kind, draw.short(0.5, 6.0) if kind == "fourier" else draw.pick(PERIODS))
 
 
-def law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
+def law(draw: Draw, low: float, high: float, shared: Clock) -> GivenLaw:
     """Draw a law that stays within [low, high]; now and then one that stands still."""
     if shared.kind == "mixed":
         found = law(
@@ -124,7 +124,7 @@ def _square(low: float, high: float, a: float, b: float, omega: float) -> Fourie
     return Fourier(mean=low + (1 + a * a + b * b) * unit, omega=omega, cos=waves)
 
 
-LawDraw = Callable[[Draw, float, float, Clock], Law]
+LawDraw = Callable[[Draw, float, float, Clock], GivenLaw]
 
 
 def scene(draw: Draw, table: str, shared: Clock, law: LawDraw = law) -> Scene:
@@ -148,7 +148,7 @@ def scene(draw: Draw, table: str, shared: Clock, law: LawDraw = law) -> Scene:
     )
 
 
-def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock, law: LawDraw) -> Law:
+def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock, law: LawDraw) -> GivenLaw:
     steepest = 0.9 * narrowest / deepest
     kind = draw.pick(("positive", "zero", "negative", "moving"))
     if kind == "moving" and steepest > 0.01:
@@ -158,7 +158,7 @@ def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock, law: Law
     return draw.short(-0.8, -0.01) if kind == "negative" else 0.0
 
 
-def any_law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
+def any_law(draw: Draw, low: float, high: float, shared: Clock) -> GivenLaw:
     """Draw a law within [low, high], in any shape that it may have.
 
     A constant may be written as a law that moves by nothing, with a period that no other has; a

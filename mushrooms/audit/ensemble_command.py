@@ -26,6 +26,7 @@ from mushrooms.audit.ensemble_checks import (
     likely_causes,
     reversal,
 )
+from mushrooms.audit.options import AuditOptions
 from mushrooms.audit.page import expected_text, figures_text, power_text, pull, to_json
 from mushrooms.audit.runs import BoolArray, FloatArray
 from mushrooms.figures import energies
@@ -64,8 +65,8 @@ NAMES = {
 }
 
 
-class Options(NamedTuple):
-    """What the command line says of an ensemble beside its file and its scene."""
+class Reading(NamedTuple):
+    """How the file of an ensemble is read: the energy of its starts, its units, and how many were started."""
 
     energy: float | None
     energy_unit: str
@@ -88,33 +89,37 @@ class EnsembleAudit(NamedTuple):
         return "refuted" if False in held else "indeterminate" if None in held else "confirmed"
 
 
-def audit_ensemble(
-    path: Path, scene_name: str | None, reversed_path: Path | None, options: Options, out: Path, as_json: bool
-) -> int:
+def audit_ensemble(path: Path, options: AuditOptions) -> int:
     """Audit an ensemble, write report.json, report.txt and report.html; return the exit code."""
-    if scene_name is None:
+    if options.scene is None:
         raise BadInput("--ensemble needs --scene, the scene that was simulated")
-    found = scene_named(scene_name)
+    found = scene_named(options.scene)
     if not isinstance(found, Mushroom) or not found.period:
-        raise BadInput(f"--scene = {scene_name!r}, must be a mushroom that moves: theory has no other")
-    if options.energy_unit not in UNITS:
-        raise BadInput(f"--energy-unit = {options.energy_unit!r}, must be one of {', '.join(UNITS)}")
-    if options.time_unit not in (None, *TIMES):
-        raise BadInput(f"--time-unit = {options.time_unit!r}, must be one of {', '.join(TIMES)}")
-    with writable_folder(out) as folder:
-        result = examine(path, found, reversed_path, options)
-        data = to_data(result, path, scene_name)
-        write_report(folder, to_json(data), to_text(data), to_html(data, result.given), as_json)
+        raise BadInput(f"--scene = {options.scene!r}, must be a mushroom that moves: theory has no other")
+    reading = reading_of(options)
+    if reading.energy_unit not in UNITS:
+        raise BadInput(f"--energy-unit = {reading.energy_unit!r}, must be one of {', '.join(UNITS)}")
+    if reading.time_unit not in (None, *TIMES):
+        raise BadInput(f"--time-unit = {reading.time_unit!r}, must be one of {', '.join(TIMES)}")
+    with writable_folder(options.out) as folder:
+        result = examine(path, found, options.backwards, reading)
+        data = to_data(result, path, options.scene)
+        write_report(folder, to_json(data), to_text(data), to_html(data, result.given), options.as_json)
     return 0 if result.verdict == "confirmed" else 1
 
 
-def examine(path: Path, scene: Mushroom, reversed_path: Path | None, options: Options) -> EnsembleAudit:
+def reading_of(options: AuditOptions) -> Reading:
+    """Return how the files of an audit are read."""
+    return Reading(options.energy, options.energy_unit or "v2/2", options.time_unit, options.particles)
+
+
+def examine(path: Path, scene: Mushroom, reversed_path: Path | None, reading: Reading) -> EnsembleAudit:
     """Read an ensemble and check it."""
-    given, notes = read(path, scene, options)
+    given, notes = read(path, scene, reading)
     theirs = expected(scene, given.energy)
     found = checks(given, theirs)
     if reversed_path is not None:
-        other, _ = read(reversed_path, scene, options._replace(particles=None))
+        other, _ = read(reversed_path, scene, reading._replace(particles=None))
         found.append(reversal(given, other, theirs))
     if isinstance(theirs, HighEnergies):
         notes.append(
@@ -125,25 +130,25 @@ def examine(path: Path, scene: Mushroom, reversed_path: Path | None, options: Op
     return EnsembleAudit(given, found, likely_causes(given, theirs, found), notes)
 
 
-def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, list[str]]:
+def read(path: Path, scene: Mushroom, reading: Reading) -> tuple[GivenEnsemble, list[str]]:
     """Return an ensemble in the scene's units, and what was taken for granted."""
-    given, n_other = read_table(path, scene, options.energy, UNITS[options.energy_unit])
-    form = options.energy_unit.replace("v2", "v²")
+    given, n_other = read_table(path, scene, reading.energy, UNITS[reading.energy_unit])
+    form = reading.energy_unit.replace("v2", "v²")
     notes = [f"energies are taken as {form}, lengths in the scene's unit: E0 = {given.energy:g} as v²/2"]
     if n_other:
         notes.append(f"{n_other:,} rows of another E0 are left out")
     if given.t_in is not None and np.isfinite(given.t_in).any():
-        unit = options.time_unit or _unit(given)
+        unit = reading.time_unit or _unit(given)
         size = scene.period if unit == "cycles" else 1.0
         t_out = None if given.t_out is None else given.t_out * size
         given = given._replace(t_in=given.t_in * size, t_out=t_out)
         told = "as parts of a cycle" if unit == "cycles" else "in the unit of the scene"
-        notes.append(f"times are taken {told}, {'as said' if options.time_unit else 'inferred'}")
+        notes.append(f"times are taken {told}, {'as said' if reading.time_unit else 'inferred'}")
     if given.captured is None and given.t_in is not None:
         given = given._replace(captured=np.isfinite(given.t_in))
         notes.append("captured are those with a t_in")
-    if options.particles is not None:
-        given = _with_particles(given, options.particles)
+    if reading.particles is not None:
+        given = _with_particles(given, reading.particles)
     return given, notes
 
 

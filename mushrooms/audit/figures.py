@@ -48,7 +48,8 @@ from mushrooms.figures.style import (
 )
 from mushrooms.orbits import follow
 from scene import Scene, load
-from scene.laws import FloatArray, values
+from scene.laws import values
+from scene.pieces import FloatArray
 from scene.tables import Mushroom, laws
 
 Panels = Any  # axes as `new_figure` returns them

@@ -31,7 +31,7 @@ from scene.files.writer import sealed, unsealed, write_file
 from scene.refusal import check_seed
 
 # Modules of this folder that decide nothing: import-linter holds that none that decides imports them.
-SHOWING = ("command.py", "ensemble_command.py", "figures.py", "page.py")
+SHOWING = ("command.py", "ensemble_command.py", "figures.py", "options.py", "page.py")
 
 
 class AuditSettings(NamedTuple):

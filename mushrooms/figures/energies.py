@@ -27,7 +27,7 @@ from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, new_f
 from mushrooms.store.spec import RunSpec
 from mushrooms.store.summary import NO_THEORY, begins_widest, known, predicted
 from scene import Mushroom, Scene, check_scene
-from scene.laws import FloatArray
+from scene.pieces import FloatArray
 from scene.refusal import BadInput, shown
 
 IntArray = npt.NDArray[np.int64]

@@ -24,8 +24,9 @@ from mushrooms.figures import style as plots, table as tables
 from mushrooms.orbits import BoolArray, FollowedOrbit, boundary, boundary_map, span_of_nu
 from scene import Mushroom, Scene, Stem
 from scene.geometry import table_at
-from scene.laws import FloatArray, is_constant
+from scene.laws import is_constant
 from scene.mouth import start_time
+from scene.pieces import FloatArray
 from scene.refusal import BadInput, shown
 
 N_FRAMES = 96

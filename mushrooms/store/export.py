@@ -9,6 +9,7 @@ What was run goes with the numbers: scene, energy, seed, versions (`provenance`)
 
 import json
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -28,14 +29,23 @@ MAX_COLUMNS = 10_000  # of a table: programs that read tables take minutes over 
 OF_THE_STORE = ("schema", "block", "cycles_of_a_chunk")  # attributes that say nothing of a table
 
 
-def export_run(run: Path, to: Path) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportOptions:
+    """The options of `mushrooms export`: the folder of a run, and the file to be written."""
+
+    run: Path
+    to: Path
+
+
+def export_run(options: ExportOptions) -> None:
     """Write a finished run as one table.
 
     Raises:
         BadInput: a block is damaged, or pyarrow is not installed.
     """
+    to = options.to
     check_file(to, (".parquet", ".csv", ".npz"))
-    found = open_run(run)
+    found = open_run(options.run)
     about = provenance(found)
     if to.suffix == ".npz":
         write_file(to, partial(_write_npz, found, about))

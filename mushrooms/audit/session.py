@@ -32,7 +32,14 @@ from scene.refusal import check_seed
 
 # Modules of this folder that decide nothing: import-linter holds that none that decides imports
 # them.
-SHOWING = ("command.py", "ensemble_command.py", "figures.py", "options.py", "page.py")
+SHOWING = (
+    "command.py",
+    "ensemble_command.py",
+    "ensemble_table.py",
+    "figures.py",
+    "options.py",
+    "page.py",
+)
 
 
 class AuditSettings(NamedTuple):

@@ -112,7 +112,9 @@ def measure_solvers(options: BenchOptions) -> None:
 def _measure(size: Size, seed: int, command: Sequence[str]) -> Record:
     """Run everything."""
     begin = time.monotonic()
-    n_questions, n_further, repeats = QUESTIONS[size], FURTHER[size], REPEATS[size]
+    n_questions = QUESTIONS[size]
+    n_further = FURTHER[size]
+    repeats = REPEATS[size]
     effort = solvers.Effort(repeats, *LASTING[size])
     with ExitStack() as stack:
         bar = stack.enter_context(progress_bar())
@@ -157,7 +159,8 @@ def _solvers(stack: ExitStack, command: Sequence[str]) -> tuple[list[Solver], di
     """Return solvers, what was compiled, and what cannot run."""
     limits = Limits(TIMEOUT, RESTARTS)
     found = [*our_solvers(), *baselines.in_python()]
-    built, not_run = dict[str, str](), dict[str, str]()
+    built = dict[str, str]()
+    not_run = dict[str, str]()
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     try:
         library, built["lean C"] = baselines.build(folder, baselines.FLAGS)
@@ -247,10 +250,12 @@ def _lanes(workload: Workload, n_times: int) -> SolverRun:
     copies = -(-128 // len(states))  # enough to fill both pools
     followed = states[:1] if workload.rule.length else states * copies
     t_end = workload.end(workload.rule.length or FLIGHTS)
-    seconds, n_collisions = 0.0, 0
+    seconds = 0.0
+    n_collisions = 0
     for _ in range(n_times):
         run, lasted = carry(workload.scene, followed, [None] * len(followed), t_end, 1)
-        n_collisions, seconds = n_collisions + int(run.wall_counts.sum()), seconds + lasted
+        n_collisions = n_collisions + int(run.wall_counts.sum())
+        seconds = seconds + lasted
     return SolverRun(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
 
 

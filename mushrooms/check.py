@@ -186,6 +186,15 @@ def show(run: Run) -> None:
         table.add_row(*row, end_section=group is groups[-2])
     console = new_console(soft_wrap=True)
     print_table(console, table)
+    _show_measured(console, run)
+    _show_objections(console, run)
+    console.print(_verdict(run, groups[-1]))
+    colour = "green" if run.exit_code() == 0 else "red"
+    console.print(f"[bold {colour}]{run.verdict()}[/]: {escape(str(run.scope()))}")
+
+
+def _show_measured(console: Console, run: Run) -> None:
+    """Print the speed, and what the statistics found."""
     if run.speed:
         console.print(
             f"Speed on {run.speed.scene}: {run.speed.best_ns:.4g} ns per collision,"
@@ -194,40 +203,43 @@ def show(run: Run) -> None:
     for result in run.results:
         if result.group == "profile" and result.verdict == "pass":
             console.print(f"{result.id}: {result.why}.")
-    _show_objections(console, run)
-    console.print(_verdict(run, groups[-1]))
-    colour = "green" if run.exit_code() == 0 else "red"
-    console.print(f"[bold {colour}]{run.verdict()}[/]: {escape(str(run.scope()))}")
 
 
 def _show_objections(console: Console, run: Run) -> None:
     """Print why the run does not succeed: what was given beside what is certified, and what fails alike."""
-    objections, stderr = run.objections(), run.stderr.split("\n")
+    objections = run.objections()
     for line in objections[:MAX_SHOWN]:
         console.print(f"[red]{escape(line)}[/]")
     if len(objections) > MAX_SHOWN:
         console.print(f"... and {len(objections) - MAX_SHOWN} more: --json FILE has them all.")
-    broken = [r for r in run.results if not r.is_right and (r.verdict == "crashed" or r.group == "protocol")]
-    if broken and any(stderr):
-        console.print("Its standard error ends:")
-        for line in [line for line in stderr if line.strip()][-MAX_ERRORS:]:
-            console.print(f"  {escape(line[:MAX_SENT])}")
-    for result in [r for r in run.results if r.expected and not r.is_known and not r.is_right][:MAX_TAUGHT]:
+    _show_stderr(console, run)
+    wrong = [result for result in run.results if not result.is_right and not result.is_known]
+    for result in [result for result in wrong if result.expected][:MAX_TAUGHT]:
         again = f"mushrooms ask {result.id} --seed {run.seed}"
         console.print(f"{result.id}, asked {escape(result.asked)}; {again} prints it")
         console.print(f"  given     {escape(format_outcome(result.given))}")
         console.print(f"  certified {escape(format_outcome(result.expected))}")
-    wrong = [r for r in run.results if not r.is_right and not r.is_known]
-    for result in [r for r in wrong if r.paste][:MAX_TAUGHT]:
-        console.print(
-            f"{result.id} as a test, where implementation is {run.command}:", markup=False, soft_wrap=True
-        )
+    for result in [result for result in wrong if result.paste][:MAX_TAUGHT]:
+        head = f"{result.id} as a test, where implementation is {run.command}:"
+        console.print(head, markup=False, soft_wrap=True)
         console.print(result.paste, markup=False, soft_wrap=True)
-    for result in [r for r in wrong if r.sent and r.group == "protocol"][:MAX_TAUGHT]:
+    of_protocol = [result for result in wrong if result.group == "protocol"]
+    for result in [result for result in of_protocol if result.sent][:MAX_TAUGHT]:
         rest = "... (--json FILE has it whole)" if len(result.sent) > MAX_SENT else ""
         console.print(f"{result.id}, sent last: {escape(result.sent[:MAX_SENT])}{rest}")
     for line in run.diagnosis:
         console.print(f"[yellow]{escape(line)}[/]")
+
+
+def _show_stderr(console: Console, run: Run) -> None:
+    """Print the end of the standard error of an implementation that crashed or broke the protocol."""
+    wrong = [result for result in run.results if not result.is_right]
+    is_broken = any(result.verdict == "crashed" or result.group == "protocol" for result in wrong)
+    lines = run.stderr.split("\n")
+    if is_broken and any(lines):
+        console.print("Its standard error ends:")
+        for line in [line for line in lines if line.strip()][-MAX_ERRORS:]:
+            console.print(f"  {escape(line[:MAX_SENT])}")
 
 
 def format_outcome(outcome: dict[str, Any] | None) -> str:

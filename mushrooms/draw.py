@@ -41,7 +41,8 @@ PICTURES = {
     "lyapunov": Usual(3, 1000.0, 256),
 }
 # Slow particles: where the wall moves as fast as they do, chaos and islands lie side by side.
-SECTION_OF_STEM, OF_STEM_AT_PHASE = Usual(40, 4.0, 4000), Usual(40, 4.0, None, 400)
+SECTION_OF_STEM = Usual(40, 4.0, 4000)
+OF_STEM_AT_PHASE = Usual(40, 4.0, None, 400)
 SECTION_AT_PHASE = Usual(40, 60.0, None, 60)
 OF_MANY = ("section", "map", "growth", "lyapunov")
 LEAST_DRAWN = 1e-100  # of lengths and times; its inverse is the greatest
@@ -219,7 +220,8 @@ def _growth(scene: Scene, options: DrawOptions) -> Figure:
     """Return the figure of an ensemble's energies from cycle to cycle."""
     usual = PICTURES["growth"]
     energy = options.energy or orbits.usual_energy(scene, usual.crossings)
-    n, n_cycles = options.particles or usual.n_orbits, options.cycles or usual.n_cycles or 1
+    n = options.particles or usual.n_orbits
+    n_cycles = options.cycles or usual.n_cycles or 1
     with progress_bar() as bar:
         found = fast.simulate(
             scene,

@@ -40,22 +40,33 @@ def print_scenes(options: ScenesOptions) -> None:
         raise BadInput("--toml and --json: must be one of them")
     if options.as_toml and not name:
         raise BadInput(f"--toml needs NAME, one of {', '.join(scenes.catalogue())}")
-    of_audit = scenes.to_data(SCENES[name]) if name in SCENES else None
-    if name and not options.as_json:
-        print((_toml(of_audit) if of_audit else catalogue_text(name)).rstrip("\n"))
+    if name:
+        print(_one_scene(name, options.as_json))
         return
-    rows = [] if name else [_catalogue_row(each) for each in scenes.catalogue()]
+    rows = [_catalogue_row(each) for each in scenes.catalogue()]
     if options.as_json:
-        print(json.dumps(rows or of_audit or read_data(name), indent=2, ensure_ascii=False))
+        print(json.dumps(rows, indent=2, ensure_ascii=False))
         return
     table = Table(Column("name", no_wrap=True), "table", "period", "notes", title="Catalogue")
     for row in rows:
-        length = (
-            "refused" if row["refused"] else "static" if row["period"] is None else f"{row['period']:.6g}"
-        )
-        notes = f"Refused: {row['refused']}" if row["refused"] else row["notes"]
-        table.add_row(row["name"], row["table"], length, notes)
+        table.add_row(row["name"], row["table"], *_period_and_notes(row))
     print_table(new_console(), table)
+
+
+def _one_scene(name: str, as_json: bool) -> str:
+    """Return a scene of the catalogue or of the audit as TOML or JSON."""
+    of_audit = scenes.to_data(SCENES[name]) if name in SCENES else None
+    if as_json:
+        return json.dumps(of_audit or read_data(name), indent=2, ensure_ascii=False)
+    return (_toml(of_audit) if of_audit else catalogue_text(name)).rstrip("\n")
+
+
+def _period_and_notes(row: dict[str, Any]) -> tuple[str, str]:
+    """Return what the table of the catalogue has in its last columns."""
+    if row["refused"]:
+        return "refused", f"Refused: {row['refused']}"
+    length = "static" if row["period"] is None else f"{row['period']:.6g}"
+    return length, row["notes"]
 
 
 def _toml(data: dict[str, Any]) -> str:
@@ -138,7 +149,8 @@ def print_prediction(options: TheoryOptions) -> None:
 
 def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
     """Return the figures of one cycle at an initial energy; where there are none, say why on stderr."""
-    speed, n_collisions = math.sqrt(2 * energy), expected_collisions(scene, energy, 1)
+    speed = math.sqrt(2 * energy)
+    n_collisions = expected_collisions(scene, energy, 1)
     first: dict[str, float | bool | None] = {
         "energy": energy,
         "v": float(f"{speed:.7g}"),
@@ -149,7 +161,8 @@ def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
     except theory.NotCovered as reason:
         print(f"{reason}. What is printed is the limit of high energies", file=sys.stderr)
         return first
-    (peak, variance), left = found.peak, found.theory_error
+    peak, variance = found.peak
+    left = found.theory_error
     figures = {
         "p_nc_at": found.p_nc,
         "m1_at": found.mean_s,

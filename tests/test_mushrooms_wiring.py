@@ -483,6 +483,40 @@ def test_summaries_are_of_what_was_followed():
     assert (nothing["collision_time"], nothing["ns_per_collision"]) == (None, 2e9)
 
 
+PULLS = [  # found, predicted, standard error, possible error of theory; the difference in both
+    (2.0, 1.0, 0.3, 0.4, 2.0), (1.0, 2.0, 0.3, 0.4, -2.0), (1.0, 1.0, 0.3, 0.4, 0.0),
+    (2.0, 1.0, 0.5, 0.0, 2.0), (2.0, 1.0, 0.0, 0.5, 2.0), (2.0, 1.0, 0.0, 0.0, None),
+    (None, 1.0, 0.3, 0.4, None), (2.0, 1.0, None, 0.4, None), (2.0, 1.0, 0.3, None, None),
+    (1.0, 0.0, 1.5, 0.0, 0.667),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("found", "wanted", "error", "left_out", "pull"), PULLS, ids=range(len(PULLS)))
+def test_a_difference_is_told_in_the_errors_that_there_are(found, wanted, error, left_out, pull):
+    """None where there is none, or where one is not known; rounded to three decimals."""
+    assert summary._pull(found, wanted, error, left_out) == pull
+
+
+@pytest.mark.parametrize("n_cycles", [1, 3])
+def test_a_prediction_of_a_run_goes_from_its_energy_towards_the_limit(n_cycles):
+    """A cycle adds what finite energy does as E^(-1/2), which falls by the mean of exp(-s / 2) each time."""
+    scene, energy = load("moving-cap"), 1e4
+    limit, here = theory.predict(scene, 10), theory.at_energy(scene, energy)
+    found = summary.predicted(RunSpec(scene, energy, n_cycles, 0))
+    falls = here.mean_of_exp(-0.5)
+    part = 1.0 if n_cycles == 1 else (1 + falls + falls**2) / 3
+    assert 0.8 < falls < 0.99
+    for name, at_infinity, at_energy in (
+        ("m1", limit.m1, here.mean_s), ("p_nc", limit.p_nc, here.p_nc),
+        ("variance", limit.sd**2, here.variance_s),
+    ):  # fmt: skip
+        expected = part * at_energy + (1 - part) * float(at_infinity)
+        assert abs(at_energy - float(at_infinity)) > 1e-4
+        assert getattr(found, name) == pytest.approx(expected, rel=1e-8)
+    assert found.m1_error == pytest.approx(part * here.theory_error.mean_s)
+    assert found.p_nc_error == pytest.approx(part * here.theory_error.p_nc)
+
+
 def test_predictions_at_an_energy_are_rounded_to_what_they_are_worth():
     found, data = theory.at_energy(load("moving-cap"), 1e5), listing._at_energy(load("moving-cap"), 1e5)
     left = found.theory_error

@@ -21,7 +21,7 @@ from fast.kernel.records import (  # isort: skip
 )  # fmt: skip
 from fast.kernel.scalar_step import GIVEN
 from fast.kernel.worker import run_careful
-from scene.transforms import times_power
+from scene.laws import times_power
 
 # Squares of what is larger overflow.
 LARGEST = 2.0**400

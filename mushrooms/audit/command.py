@@ -17,8 +17,8 @@ from mushrooms.audit.claims import all_claims, select_claims
 from mushrooms.audit.ensemble_command import audit_ensemble
 from mushrooms.audit.options import AuditOptions
 from mushrooms.audit.page import to_data, to_html, to_json, to_text
-from mushrooms.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
-from mushrooms.audit.session import AuditResult, AuditSettings
+from mushrooms.audit.runs import Simulation, Size, run_seed, scene_of
+from mushrooms.audit.session import AuditResult, AuditSettings, needed
 from mushrooms.folders import locked, writable_folder
 from mushrooms.output import write_report
 from mushrooms.progress import Watch, announce_compilation, progress_bar
@@ -119,12 +119,6 @@ def _check_report(folder: Path, wanted: set[str]) -> None:
 
 
 FOLDER = "runs"
-
-
-def needed(claims: Sequence[Claim], size: Size) -> list[Simulation]:
-    """Return the runs that claims rest on, in the order in which they are made."""
-    runs = [RUNS[name] for name in dict.fromkeys(name for claim in claims for name in claim.runs)]
-    return [run for run in runs if run.n_particles(size)]
 
 
 def spec_of(run: Simulation, seed: int) -> RunSpec:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AuditOptions:
-    """The options of `mushrooms audit`; those after `ensemble` are of an ensemble of another program.
+    """The options of `mushrooms audit`; those after `ensemble` are of another program's ensemble.
 
     Attributes:
         out: folder for the report.

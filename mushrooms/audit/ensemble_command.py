@@ -1,8 +1,9 @@
 """`mushrooms audit --ensemble`: an ensemble of another program, held to the paper; one page of it.
 
-It is read a part at a time from CSV, Parquet or Zarr. A row is a particle. Columns: E0, E1, E2 ... after each
-cycle, or s = log E1/E0; where there are any, t_in and t_out (ends of the first cycle's capture interval),
-captured (0 or 1), and x0, y0, where it started. The names that `mushrooms export` writes will do.
+It is read a part at a time from CSV, Parquet or Zarr. A row is a particle. Columns: E0, E1, E2 ...
+after each cycle, or s = log E1/E0; where there are any, t_in and t_out (ends of the first cycle's
+capture interval), captured (0 or 1), and x0, y0, where it started. The names that `mushrooms
+export` writes will do.
 """
 
 import re
@@ -66,7 +67,7 @@ NAMES = {
 
 
 class Reading(NamedTuple):
-    """How the file of an ensemble is read: the energy of its starts, its units, and how many were started."""
+    """How a file is read: the energy of all starts, the units, and the number of starts."""
 
     energy: float | None
     energy_unit: str
@@ -95,25 +96,35 @@ def audit_ensemble(path: Path, options: AuditOptions) -> int:
         raise BadInput("--ensemble needs --scene, the scene that was simulated")
     found = scene_named(options.scene)
     if not isinstance(found, Mushroom) or not found.period:
-        raise BadInput(f"--scene = {options.scene!r}, must be a mushroom that moves: theory has no other")
+        raise BadInput(
+            f"--scene = {options.scene!r}, must be a mushroom that moves: theory has no other"
+        )
     reading = reading_of(options)
     if reading.energy_unit not in UNITS:
-        raise BadInput(f"--energy-unit = {reading.energy_unit!r}, must be one of {', '.join(UNITS)}")
+        raise BadInput(
+            f"--energy-unit = {reading.energy_unit!r}, must be one of {', '.join(UNITS)}"
+        )
     if reading.time_unit not in (None, *TIMES):
         raise BadInput(f"--time-unit = {reading.time_unit!r}, must be one of {', '.join(TIMES)}")
     with writable_folder(options.out) as folder:
         result = examine(path, found, options.backwards, reading)
         data = to_data(result, path, options.scene)
-        write_report(folder, to_json(data), to_text(data), to_html(data, result.given), options.as_json)
+        write_report(
+            folder, to_json(data), to_text(data), to_html(data, result.given), options.as_json
+        )
     return 0 if result.verdict == "confirmed" else 1
 
 
 def reading_of(options: AuditOptions) -> Reading:
     """Return how the files of an audit are read."""
-    return Reading(options.energy, options.energy_unit or "v2/2", options.time_unit, options.particles)
+    return Reading(
+        options.energy, options.energy_unit or "v2/2", options.time_unit, options.particles
+    )
 
 
-def examine(path: Path, scene: Mushroom, reversed_path: Path | None, reading: Reading) -> EnsembleAudit:
+def examine(
+    path: Path, scene: Mushroom, reversed_path: Path | None, reading: Reading
+) -> EnsembleAudit:
     """Read an ensemble and check it."""
     given, notes = read(path, scene, reading)
     theirs = expected(scene, given.energy)
@@ -124,7 +135,8 @@ def examine(path: Path, scene: Mushroom, reversed_path: Path | None, reading: Re
     if isinstance(theirs, HighEnergies):
         notes.append(
             "no frozen rates of this scene: finite energy is not in the theory, and"
-            f" {theirs.theory_error.mean_s:.2g} is granted for it, a guess by (walls' speed / v)^(2/3)"
+            f" {theirs.theory_error.mean_s:.2g} is granted for it, a guess by"
+            " (walls' speed / v)^(2/3)"
         )
         found = [c._replace(holds=None) if c.holds is False and c.band else c for c in found]
     return EnsembleAudit(given, found, likely_causes(given, theirs, found), notes)
@@ -134,7 +146,9 @@ def read(path: Path, scene: Mushroom, reading: Reading) -> tuple[GivenEnsemble, 
     """Return an ensemble in the scene's units, and what was taken for granted."""
     given, n_other = read_table(path, scene, reading.energy, UNITS[reading.energy_unit])
     form = reading.energy_unit.replace("v2", "v²")
-    notes = [f"energies are taken as {form}, lengths in the scene's unit: E0 = {given.energy:g} as v²/2"]
+    notes = [
+        f"energies are taken as {form}, lengths in the scene's unit: E0 = {given.energy:g} as v²/2"
+    ]
     if n_other:
         notes.append(f"{n_other:,} rows of another E0 are left out")
     if given.t_in is not None and np.isfinite(given.t_in).any():
@@ -161,7 +175,7 @@ def _with_particles(given: GivenEnsemble, n_particles: int) -> GivenEnsemble:
 
 
 def _unit(given: GivenEnsemble) -> str:
-    """Return the unit in which times are in the cycle; of two that in which they are nearer to theory's."""
+    """Return the unit in which times are in the cycle; of two the one that is nearer to theory."""
     begin = cycle_start(given.scene)
     span = given.scene.period
     known = np.empty(0) if given.t_in is None else given.t_in[np.isfinite(given.t_in)]
@@ -173,8 +187,8 @@ def _unit(given: GivenEnsemble) -> str:
     fitting = [unit for unit, size in sizes.items() if least <= low * size and high * size <= most]
     if not fitting:
         raise BadInput(
-            f"t_in = {low:g} to {high:g}, must be in the cycle, {begin:g} to {begin + span:g} in the"
-            " scene's time, or 0 to 1 in cycles: --time-unit says which"
+            f"t_in = {low:g} to {high:g}, must be in the cycle, {begin:g} to {begin + span:g}"
+            " in the scene's time, or 0 to 1 in cycles: --time-unit says which"
         )
     theirs = expected(given.scene, given.energy)
     if len(fitting) == 1 or theirs.p_nc == 1:
@@ -238,7 +252,9 @@ def capture_times(given: GivenEnsemble) -> bytes | None:
         return None
     figure, axes = new_figure(4.8, 3.2)
     edges = np.linspace(t.min(), t.max(), N_BINS + 1)
-    axes.stairs(np.histogram(t, edges, density=True)[0], edges, fill=True, color=SKY, label="ensemble")
+    axes.stairs(
+        np.histogram(t, edges, density=True)[0], edges, fill=True, color=SKY, label="ensemble"
+    )
     theirs = expected(given.scene, given.energy)
     if theirs.p_nc < 1:
         mass = np.diff(theirs.capture_cdf(edges)) / np.diff(edges)
@@ -248,13 +264,16 @@ def capture_times(given: GivenEnsemble) -> bytes | None:
     return svg(figure)
 
 
-def read_table(path: Path, scene: Mushroom, energy: float | None, unit: float) -> tuple[GivenEnsemble, int]:
+def read_table(
+    path: Path, scene: Mushroom, energy: float | None, unit: float
+) -> tuple[GivenEnsemble, int]:
     """Read an ensemble, its times as they are written.
 
     Args:
         path: a .csv or .parquet file, or a .zarr folder, or a folder that holds ensemble.zarr.
         scene: that is claimed to have been simulated.
-        energy: of the rows to read where E0 has several, or of all where there is no E0, in the file's unit.
+        energy: of the rows to read where E0 has several, or of all where there is no E0, in the
+            file's unit.
         unit: v^2/2 of an energy of 1 in the file.
 
     Returns:
@@ -276,7 +295,9 @@ def read_table(path: Path, scene: Mushroom, energy: float | None, unit: float) -
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             after = columns.pop(ENERGIES, np.empty((0, 1)))
             sums = columns.pop(GAIN)[:, None] if GAIN in columns else np.log(after / start[:, None])
-            is_binary32 &= bool(after.size) and not np.any(np.abs(after - after.astype(np.float32)) > 0)
+            is_binary32 &= bool(after.size) and not np.any(
+                np.abs(after - after.astype(np.float32)) > 0
+            )
         followed = np.isfinite(sums).all(axis=1)
         n_lost += int(np.sum(~followed))
         for name, column in {**columns, "sums": sums}.items():
@@ -344,16 +365,21 @@ def _is_start(label: str, start: FloatArray, energy: float, *, is_asked: bool) -
 
 
 def _parts(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
-    """Yield parts of a table by what its columns are: (n, K) the energies after K cycles, (n,) all others."""
+    """Yield parts of a table by what its columns are: (n, K) energies after K cycles, else (n,)."""
     readers = {".csv": _csv, ".parquet": _parquet, ".zarr": _zarr}
     run = folder_of(path)
     path = path / GROUP if (path / GROUP).is_dir() else path
     if run is None and path.suffix not in readers:
-        raise BadInput(f"{label}, must be a .csv or .parquet file, a .zarr folder, or the folder of a run")
+        raise BadInput(
+            f"{label}, must be a .csv or .parquet file, a .zarr folder, or the folder of a run"
+        )
     parts = readers[path.suffix](path, label) if run is None else _run(run)
     try:
         for raw in parts:
-            named = {what: [raw[name] for name in names] for what, names in _find_columns(label, raw).items()}
+            named = {
+                what: [raw[name] for name in names]
+                for what, names in _find_columns(label, raw).items()
+            }
             stacked = {what: np.column_stack(columns) for what, columns in named.items()}
             yield {
                 what: column if what == ENERGIES else np.asarray(np.fmin.reduce(column, axis=1))
@@ -370,7 +396,11 @@ def _run(folder: Path) -> Iterator[dict[str, FloatArray]]:
     run = open_run(folder)
     for number in range(run.shape.n_blocks):
         part = {"cycle_energies": run.read(number, "cycle_energies")}
-        part |= {name: run.read(number, name)[:, 0] for name in ("t_in", "t_out") if name in run.shape.names}
+        part |= {
+            name: run.read(number, name)[:, 0]
+            for name in ("t_in", "t_out")
+            if name in run.shape.names
+        }
         yield {"E0": np.full(run.shape.rows(number), run.spec.energy), **part}
 
 
@@ -389,7 +419,7 @@ def _select_columns(label: str, names: Iterable[str]) -> list[str]:
 
 
 def _csv(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
-    """Yield parts of a CSV file: by Arrow where it is installed and numbers are decimal, else by cells.
+    """Yield parts of a CSV file: by Arrow if it is there and numbers are decimal, else by cells.
 
     Of a million rows of two columns Arrow takes half a second, the reader by cells four.
     """
@@ -401,7 +431,9 @@ def _csv(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
         from pyarrow import csv as arrow
 
         options = arrow.ConvertOptions(
-            include_columns=wanted, column_types=dict.fromkeys(wanted, "float64"), null_values=list(NOTHING)
+            include_columns=wanted,
+            column_types=dict.fromkeys(wanted, "float64"),
+            null_values=list(NOTHING),
         )
         reading = arrow.ReadOptions(column_names=header, skip_rows=1, block_size=2**24)
         for batch in arrow.open_csv(path, reading, convert_options=options):
@@ -410,11 +442,16 @@ def _csv(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
     except (ImportError, ValueError, KeyError):  # the cells tell what is wrong, and where
         rows = islice(read_rows(path, label, wanted), n_done, None)
         for some in iter(lambda: list(islice(rows, FEW)), []):
-            yield {name: np.array([_cell(place, name, row[name]) for place, row in some]) for name in wanted}
+            yield {
+                name: np.array([_cell(place, name, row[name]) for place, row in some])
+                for name in wanted
+            }
 
 
 def _cell(place: str, name: str, word: str) -> float:
-    return float("nan") if word in NOTHING else read_number(place, name, FLAGS.get(word.lower(), word))
+    return (
+        float("nan") if word in NOTHING else read_number(place, name, FLAGS.get(word.lower(), word))
+    )
 
 
 def _parquet(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
@@ -453,7 +490,7 @@ def _zarr(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
 
 
 def _values(label: str, name: str, array: Any, first: int) -> FloatArray:
-    """Return part of an array of a Zarr group; of several cycles only energies have more than the first."""
+    """Return part of an array of a Zarr group: all cycles of energies, the first of all else."""
     try:
         values = np.asarray(array[first : first + PART], np.float64)
     except UNREADABLE as error:

@@ -21,8 +21,9 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
-    help="Particles between moving walls: theory, simulation and the audit of Oscillating"
-    " mushrooms.",
+    help=(
+        "Particles between moving walls: theory, simulation and the audit of Oscillating mushrooms."
+    ),
     epilog="Example: mushrooms audit --out audit-report",
 )
 
@@ -96,7 +97,13 @@ def main(
     """Hold the options that come before any command."""
 
 
-@app.command(epilog="Example: mushrooms scenes moving-cap --toml > mine.toml")
+@app.command(
+    epilog="Example: mushrooms scenes moving-cap --toml > mine.toml",
+    help=(
+        "List the catalogue. A scene that is refused is shown with the reason. "
+        "With NAME print that scene."
+    ),
+)
 def scenes(
     name: Annotated[
         str,
@@ -107,7 +114,7 @@ def scenes(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """List the catalogue. A refused scene is shown with the reason. With NAME print that scene."""
+    """List the catalogue, or print a scene."""
     from mushrooms.scenes import ScenesOptions, print_scenes
 
     options = ScenesOptions(name=name, as_toml=as_toml, as_json=as_json)
@@ -125,8 +132,8 @@ def warm(
 ) -> None:
     """Compile the fast stepper ahead, so that no later command waits for it.
 
-    The code is kept for this user and machine: in the folder NUMBA_CACHE_DIR if that is set, else beside the
-    package. Without SCENE all kernels are compiled, which takes minutes.
+    The code is kept for this user and machine: in the folder NUMBA_CACHE_DIR if that is set, else
+    beside the package. Without SCENE all kernels are compiled, which takes minutes.
     """
     from mushrooms.warm import WarmOptions, warm_kernels
 
@@ -160,16 +167,16 @@ def theory(
 Picture = Annotated[
     Path | None,
     file(
-        "A .svg, .png, .pdf or .gif file; default: SCENE.svg. If there are several pictures, the"
-        " kind is added to each name."
+        "A .svg, .png, .pdf or .gif file; default: SCENE.svg. If there are several pictures, the "
+        "kind is added to each name."
     ),
 ]
 Section = Annotated[
     bool,
     typer.Option(
         "--section",
-        help="Poincare section: place on the arc against sin phi. For a stem: phase of the moving"
-        " wall against the velocity after the hit.",
+        help="Poincare section: place on the arc against sin phi. For a stem: phase of the moving "
+        "wall against the velocity after the hit.",
     ),
 ]
 Growth = Annotated[
@@ -178,6 +185,13 @@ Growth = Annotated[
         "--growth",
         help="Mean and spread of ln(E/E0) against the cycle, with the theory. With --particles 1: "
         "ln(E/E0) against time.",
+    ),
+]
+
+BoundaryMap = Annotated[
+    bool,
+    typer.Option(
+        "--map", help="Boundary map: place along all walls against the sine of the angle."
     ),
 ]
 Phase = Annotated[
@@ -199,12 +213,7 @@ def draw(
         bool, typer.Option("--trajectory", help="Path of one particle; a .gif is an animation.")
     ] = False,
     section: Section = False,
-    boundary_map: Annotated[
-        bool,
-        typer.Option(
-            "--map", help="Boundary map: place along all walls against the sine of the angle."
-        ),
-    ] = False,
+    boundary_map: BoundaryMap = False,
     growth: Growth = False,
     lyapunov: Annotated[
         bool, typer.Option("--lyapunov", help="Finite-time Lyapunov exponents with their errors.")
@@ -246,16 +255,20 @@ def draw(
     draw_scene(options)
 
 
-Dask = Annotated[
-    str | None,
-    typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers simulate the blocks."),
-]
 Resume = Annotated[
     bool,
     typer.Option(
         "--resume",
         help="Continue the run in DIR; with more --particles or more --cycles, extend it.",
     ),
+]
+Dask = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers simulate the blocks."),
+]
+Block = Annotated[
+    int | None,
+    whole("Particles stored at a time; default: some seconds of work.", 1, LARGEST_BLOCK),
 ]
 Phases = Annotated[
     str | None,
@@ -267,8 +280,9 @@ Phases = Annotated[
 
 
 @app.command(
-    epilog="Example: mushrooms simulate moving-cap --particles 25000 --energy 1e7 --seed 1"
-    " --out run"
+    epilog=(
+        "Example: mushrooms simulate moving-cap --particles 25000 --energy 1e7 --seed 1 --out run"
+    ),
 )
 def simulate(
     scene: SceneName,
@@ -284,10 +298,7 @@ def simulate(
     ] = None,
     resume: Resume = False,
     dask: Dask = None,
-    block: Annotated[
-        int | None,
-        whole("Particles stored at a time; default: some seconds of work.", 1, LARGEST_BLOCK),
-    ] = None,
+    block: Block = None,
     max_collisions: Annotated[
         int | None, whole("Stop if a particle makes more collisions than this.", 1)
     ] = None,
@@ -328,16 +339,19 @@ def simulate(
     simulate_scene(options)
 
 
-@app.command(epilog="Example: mushrooms export run --to run.csv")
+@app.command(
+    epilog="Example: mushrooms export run --to run.csv",
+    help=(
+        "Write a finished run as one table, one row per particle. "
+        "An .npz holds the arrays of `fast.Ensemble`.\n\n"
+        "The run is read block by block and its checksums are tested. A damaged run is refused."
+    ),
+)
 def export(
     run: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `simulate --out` wrote.")],
     to: Annotated[Path, file("A .parquet, .csv or .npz file.")],
 ) -> None:
-    """Write a finished run as one table, one row per particle, or its arrays as an .npz.
-
-    An .npz has the arrays of `fast.Ensemble`. The run is read block by block and its checksums are
-    tested. A damaged run is refused.
-    """
+    """Write a finished run as one table, or as arrays."""
     from mushrooms.store.export import ExportOptions, export_run
 
     options = ExportOptions(run=run, to=to)

@@ -565,7 +565,9 @@ def caps_of(rule: ProtocolRule, is_kept: bool, n: int) -> list[RuleCase]:
 
 def answers_in_files(command: tuple[str, ...], folder: Path, cases: list[RuleCase]) -> list[str]:
     """Return the outcomes of a program that reads questions in CSV and answers in CSV."""
-    questions = {str(seq).encode(): SheetQuestion("rule", seq, cases[seq].request) for seq in range(len(cases))}
+    questions = {
+        str(seq).encode(): SheetQuestion("rule", seq, drawn.request) for seq, drawn in enumerate(cases)
+    }
     asked = SimpleNamespace(questions=questions, level="core", seed=1, fresh=[])
     assert sheets.write_tables(asked, folder) == len(cases)
     done = subprocess.run(command, cwd=folder, capture_output=True, check=True)

@@ -24,7 +24,7 @@ from conformance import plain
 from conformance.cases import scenes
 from conformance.cases.draw import Draw, leaves, readable, wire_form
 from conformance.properties import BOUND, SLACK
-from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
+from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, rising
 from conformance.suite.session import read_outcome
 from scene import (
     BadInput,
@@ -263,7 +263,9 @@ def _arrives(
         end = walker(scene, before, t_end)
     else:
         t_end, end = getattr(last, "t", state.t), last
+    side.require_time("hits of a flow", len(hits))
     (found,) = side.flown(scene, [state], t_end)
+    side.keep_pace("hits of a flow", len(hits))
     arrival = read_outcome(found)
     if isinstance(arrival, Undecided) or not isinstance(end, Horizon):
         return False
@@ -505,8 +507,8 @@ def _replaced(data: Any, old: float, new: float) -> Any:
 
 def long(draw: Draw, profile: str) -> Iterator[Question]:
     """Follow paths of many hits, on orbits where rounding grows slowly."""
-    for i, n in enumerate(octaves(draw, 2, 16 if profile == "step" else MAX_HITS)):
-        scene, state = REGULAR[i % len(REGULAR)] if i else REGULAR[0]
+    for i, n in enumerate(rising(draw, 2, 16 if profile == "step" else MAX_HITS)):
+        scene, state = REGULAR[-1 - i % len(REGULAR)]  # the longest path is in a table that moves
         turned = replace(state, vx=state.vx * draw.between(0.9, 1.1), vy=state.vy * draw.between(0.9, 1.1))
         yield scene, turned, math.ceil(n)
 

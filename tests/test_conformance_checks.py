@@ -271,7 +271,10 @@ def hits_of(request: dict[str, Any], answer: dict[str, Any]) -> float:
     return 1 + sum(flown)
 
 
-SLOW = ("promise/long-paths", "promise/long-flow", "promise/many-particles", "profile/work-identity")
+SLOW = (
+    *(f"promise/{name}" for name in ("long-paths", "long-flow", "many-particles")),
+    f"profile/{flows.PROFILES[0]}",
+)
 
 
 @pytest.mark.parametrize("pace", [0.02, 0.2])

@@ -16,7 +16,7 @@ from statistics import median
 
 from conformance import vectors
 from conformance.bench import record
-from conformance.files import write_file
+from scene.files.writer import write_file
 
 DOCS = Path(__file__).resolve().parent
 REGION = re.compile(r"(<!-- figures: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)

@@ -16,8 +16,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from conformance.files import write_file
 from mushrooms.figures import style
+from scene.files.writer import write_file
 
 DOCS = Path(__file__).resolve().parent
 GALLERY = DOCS / "gallery"

@@ -12,8 +12,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from mpmath.libmp import libelefun, libmpf, libmpi
-
+from scene import mpmath_internals as raw
 from scene.precision import CONSTANTS, ExactMpf, intervals, reduce_record
 
 Interval = Any  # mpmath's ivmpf, which has no type stubs
@@ -23,7 +22,6 @@ BITS_PER_DIGIT = 3.3219280948873626
 # at 50 digits, 4,400 for a plain step at 10,000 digits; 0.03 to 0.2 ms a unit on one idle core.
 MAX_WORK = 50_000.0
 LONG_NUMBER = 1024  # bits; arithmetic with so long a number takes twice as long as with a short one
-_FLOOR, _CEILING = "f", "c"
 
 
 class Undecidable(Exception):  # noqa: N818 (not an error of the caller: precision is raised)
@@ -83,11 +81,11 @@ class Enclosure(NamedTuple):
 
     def centre(self) -> Fraction:
         """Return (lo + hi) / 2, exactly."""
-        return (rational(self.lo._mpf_) + rational(self.hi._mpf_)) / 2
+        return (rational(raw.number(self.lo)) + rational(raw.number(self.hi))) / 2
 
     def extent(self) -> Fraction:
         """Return hi - lo, exactly."""
-        return rational(self.hi._mpf_) - rational(self.lo._mpf_)
+        return rational(raw.number(self.hi)) - rational(raw.number(self.lo))
 
     def width(self) -> float:
         """Return hi - lo, rounded."""
@@ -95,24 +93,23 @@ class Enclosure(NamedTuple):
 
     def contains(self, number: float | Fraction) -> bool:
         """Tell exactly whether a number lies within."""
-        return rational(self.lo._mpf_) <= Fraction(number) <= rational(self.hi._mpf_)
+        return rational(raw.number(self.lo)) <= Fraction(number) <= rational(raw.number(self.hi))
 
 
-def rational(raw: tuple[int, int, int, int]) -> Fraction:
-    """Return the rational that a raw finite mpf stands for."""
-    numerator, denominator = libmpf.to_rational(raw)
+def rational(number: raw.Raw) -> Fraction:
+    """Return the rational that a raw finite number stands for."""
+    numerator, denominator = raw.to_rational(number)
     return Fraction(int(numerator), int(denominator))
 
 
-def exact_number(raw: tuple[int, int, int, int]) -> ExactMpf:
-    """Return the number that a raw finite mpf stands for."""
-    is_negative, mantissa, exponent, _ = raw
-    return ExactMpf.of(-mantissa if is_negative else mantissa, exponent)
+def exact_number(number: raw.Raw) -> ExactMpf:
+    """Return the number that a raw finite number stands for."""
+    return ExactMpf.of(*raw.parts(number))
 
 
 def exact_ends(interval: Interval) -> tuple[Fraction, Fraction]:
     """Return the ends of a finite interval as rationals."""
-    low, high = interval._mpi_
+    low, high = raw.ends(interval)
     return rational(low), rational(high)
 
 
@@ -143,59 +140,61 @@ class Arithmetic:
         """Enclose a number: exactly when it is a float or a short integer."""
         if isinstance(value, Fraction):
             return self.number(value.numerator) / self.number(value.denominator)
-        exactly = libmpf.from_int if isinstance(value, int) else libmpf.from_float
-        return self.context.make_mpf((exactly(value, self.prec, _FLOOR), exactly(value, self.prec, _CEILING)))
+        exactly = raw.from_int if isinstance(value, int) else raw.from_float
+        return self.context.make_mpf((exactly(value, self.prec, raw.DOWN), exactly(value, self.prec, raw.UP)))
 
     def dyadic(self, value: Fraction) -> Interval:
         """Return the thin interval at a rational whose denominator is a power of two, exactly."""
         shift = value.denominator.bit_length() - 1
-        return self.point(libmpf.from_man_exp(value.numerator, -shift))
+        return self.point(raw.from_parts(value.numerator, -shift))
 
     def between(self, low: Fraction, high: Fraction) -> Interval:
         """Return the interval between two such rationals, exactly."""
         return self.hull(self.dyadic(low), self.dyadic(high))
 
-    def point(self, raw: Any) -> Interval:
-        """Return the thin interval at a raw mpf."""
-        return self.context.make_mpf((raw, raw))
+    def point(self, number: raw.Raw) -> Interval:
+        """Return the thin interval at a raw number."""
+        return self.context.make_mpf((number, number))
 
     def power_of_two(self, exponent: int) -> Interval:
         """Return 2^exponent, exactly."""
-        return self.point(libmpf.from_man_exp(1, exponent))
+        return self.point(raw.from_parts(1, exponent))
 
     def lower(self, x: Interval) -> Interval:
         """Return the lower end as a thin interval."""
-        return self.point(x._mpi_[0])
+        return self.point(raw.ends(x)[0])
 
     def upper(self, x: Interval) -> Interval:
         """Return the upper end as a thin interval."""
-        return self.point(x._mpi_[1])
+        return self.point(raw.ends(x)[1])
 
     def hull(self, x: Interval, y: Interval) -> Interval:
         """Return the interval from the lower end of x to the upper end of y."""
-        return self.context.make_mpf((x._mpi_[0], y._mpi_[1]))
+        return self.context.make_mpf((raw.ends(x)[0], raw.ends(y)[1]))
 
     def union(self, intervals: Sequence[Interval]) -> Interval:
         """Return the smallest interval that holds all of these."""
-        lo, hi = intervals[0]._mpi_
+        lo, hi = raw.ends(intervals[0])
         for x in intervals[1:]:
-            a, b = x._mpi_
-            lo, hi = (a if libmpf.mpf_lt(a, lo) else lo), (b if libmpf.mpf_gt(b, hi) else hi)
+            a, b = raw.ends(x)
+            lo, hi = (a if raw.is_less(a, lo) else lo), (b if raw.is_greater(b, hi) else hi)
         return self.context.make_mpf((lo, hi))
 
     def middle(self, x: Interval) -> Interval:
         """Return a short dyadic point well inside x (half way when x is very thin)."""
-        a, b = x._mpi_
-        exact = libmpf.mpf_shift(libmpf.mpf_add(a, b), -1)
-        short = libmpf.mpf_pos(exact, 53, "n")
-        inside = libmpf.mpf_lt(a, short) and libmpf.mpf_lt(short, b)
+        a, b = raw.ends(x)
+        exact = raw.shifted(raw.add(a, b), -1)
+        short = raw.rounded(exact, 53, raw.NEAREST)
+        inside = raw.is_less(a, short) and raw.is_less(short, b)
         return self.point(short if inside else exact)
 
     def intersection(self, x: Interval, y: Interval) -> Interval:
         """Return the common part of two intervals that meet."""
-        lo = x._mpi_[0] if libmpf.mpf_gt(x._mpi_[0], y._mpi_[0]) else y._mpi_[0]
-        hi = x._mpi_[1] if libmpf.mpf_lt(x._mpi_[1], y._mpi_[1]) else y._mpi_[1]
-        if libmpf.mpf_gt(lo, hi):
+        a, b = raw.ends(x)
+        c, d = raw.ends(y)
+        lo = a if raw.is_greater(a, c) else c
+        hi = b if raw.is_less(b, d) else d
+        if raw.is_greater(lo, hi):
             raise Undecidable("disjoint enclosures of one number")
         return self.context.make_mpf((lo, hi))
 
@@ -206,12 +205,12 @@ class Arithmetic:
 
     def square(self, x: Interval) -> Interval:
         """Return x^2, never below 0."""
-        return self.context.make_mpf(libmpi.mpi_square(x._mpi_, self.prec))
+        return self.context.make_mpf(raw.interval_square(raw.ends(x), self.prec))
 
     def cos_sin(self, x: Interval) -> tuple[Interval, Interval]:
         """Return cos x and sin x; wide arguments give [-1, 1]."""
-        a, b = x._mpi_
-        if libmpf.mpf_gt(libmpf.mpf_sub(b, a, 30, _FLOOR), libmpf.from_int(3)):
+        a, b = raw.ends(x)
+        if raw.is_greater(raw.subtract(b, a, 30, raw.DOWN), raw.from_int(3)):
             whole = self.context.mpf([-1, 1])
             return whole, whole
         cos, sin = self.context.cos_sin(x)
@@ -236,35 +235,35 @@ class Arithmetic:
         if abs(angle) < 8:
             return self.number(omega), self.dyadic(angle)
         pi = self._pi(self.prec + abs(angle.numerator // angle.denominator).bit_length() + 8)
-        half_turns = rational(pi._mpi_[0]), rational(pi._mpi_[1])
+        half_turns = exact_ends(pi)
         n = angle // (2 * half_turns[0])  # whole turns: any number of them may be subtracted
         ends = [angle - 2 * n * half_turn for half_turn in half_turns]
         return self.number(omega), self.between(min(ends), max(ends))
 
     def _pi(self, bits: int) -> Interval:
         with CONSTANTS:
-            low, high = libelefun.mpf_pi(bits, _FLOOR), libelefun.mpf_pi(bits, _CEILING)
+            low, high = raw.pi(bits, raw.DOWN), raw.pi(bits, raw.UP)
         return self.context.make_mpf((low, high))
 
     def enclosure(self, x: Interval) -> Enclosure:
         """Return the ends as exact numbers, free of this context."""
-        lo, hi = x._mpi_
+        lo, hi = raw.ends(x)
         return Enclosure(exact_number(lo), exact_number(hi))
 
 
 def sign(x: Interval) -> int:
     """Return +1 or -1 when all of x has that sign, 0 when that is not so."""
-    lo, hi = x._mpi_
-    if libmpf.mpf_sign(lo) > 0:
+    lo, hi = raw.ends(x)
+    if raw.sign(lo) > 0:
         return 1
-    return -1 if libmpf.mpf_sign(hi) < 0 else 0
+    return -1 if raw.sign(hi) < 0 else 0
 
 
 def is_below(x: Interval, y: Interval) -> bool:
     """Tell whether every number of x is smaller than every number of y."""
-    return bool(libmpf.mpf_lt(x._mpi_[1], y._mpi_[0]))
+    return bool(raw.is_less(raw.ends(x)[1], raw.ends(y)[0]))
 
 
 def is_at_most_zero(x: Interval) -> bool:
     """Tell whether no number of x is positive."""
-    return bool(libmpf.mpf_sign(x._mpi_[1]) <= 0)
+    return bool(raw.sign(raw.ends(x)[1]) <= 0)

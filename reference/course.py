@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 from reference import rational
 from reference.arithmetic import Exhausted, Interval, Undecidable, exact_ends, is_below, sign
 from reference.isolation import Isolator
+from reference.prepared import Prepared
 from reference.walls import MovingWalls
-from scene import Cap, Mushroom, Scene, State, Stem, Undefined, Wall
-from scene.laws import bounds
-from scene.tables import laws
+from scene import State, Undefined, Wall
+from scene.mpmath_internals import ends
 
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
 BEYOND = 2.0**-10  # how far past the end of a search f is still looked at, as a share of its length
@@ -40,7 +40,7 @@ class Course:
     """A flight, and the questions about it.
 
     Attributes:
-        scene: table and laws.
+        table: the scene, prepared.
         motion: the walls along the flight, at the working precision.
         leaving: the wall the particle is on, if any, with its residual f(0).
         is_flat: on that wall f'(0) = 0 and f''(0) > 0, both exactly.
@@ -49,7 +49,7 @@ class Course:
         exact: the state as binary64 numbers, when it is one; decides ties.
     """
 
-    scene: Scene
+    table: Prepared
     motion: MovingWalls
     leaving: dict[Wall, Interval]
     is_flat: bool
@@ -86,7 +86,7 @@ class Course:
 
     def _runs_along_mouth(self) -> bool:
         is_level = self.exact is not None and self.exact.y == 0 and self.exact.vy == 0
-        return isinstance(self.scene, Mushroom) and is_level and not self.leaving
+        return self.table.is_mushroom and is_level and not self.leaving
 
     def _along_mouth(self) -> Undefined | None:
         """Follow a path along y = 0 inside the mouth: it can only end at the mouth's edge."""
@@ -122,7 +122,7 @@ class Course:
 
     def _beyond_crossing(self, crossing: Interval) -> Hit | Undefined | None:
         """Continue a flight that met nothing before y = 0: to the base, or through the mouth."""
-        if isinstance(self.scene, Cap):
+        if self.table.is_cap:
             return self._base_hit(crossing)
         x = self.flight.x + self.flight.vx * crossing
         w = self.motion.width(crossing).f
@@ -132,7 +132,7 @@ class Course:
             return self._base_hit(crossing)
         if signs != [1, 1]:
             return self._at_the_edge()
-        if isinstance(self.scene, Stem):
+        if self.table.is_stem:
             return self._base_hit(crossing)
         found = self._first_hit(SIDES if self.in_cap else ("arc",), self.arithmetic.lower(crossing), None)
         if isinstance(found, Hit) and not is_below(crossing, found.time):
@@ -141,19 +141,19 @@ class Course:
 
     def _at_the_edge(self) -> Undefined:
         """Judge a crossing of y = 0 that may or may not lie between the sides."""
-        is_mouth = isinstance(self.scene, Mushroom)
+        is_mouth = self.table.is_mushroom
         instant = None if self.exact is None else rational.crossing_time(self.exact)
         if (
             self.exact is not None
             and instant is not None
-            and any(rational.is_zero(self.scene, self.exact, side, instant) for side in SIDES[:2])
+            and any(rational.is_zero(self.table, self.exact, side, instant) for side in SIDES[:2])
         ):
             return Undefined("mouth-edge" if is_mouth else "corner")
         edge = "the mouth's edge" if is_mouth else "a corner"
         raise Undecidable(f"{edge} is met, as far as this precision shows")
 
     def _base_hit(self, crossing: Interval) -> Hit:
-        return Hit("base", crossing, -self.flight.vy if isinstance(self.scene, Stem) else self.flight.vy)
+        return Hit("base", crossing, -self.flight.vy if self.table.is_stem else self.flight.vy)
 
     def _first_hit(
         self, walls: tuple[Wall, ...], start: Interval, limit: Interval | None
@@ -213,7 +213,7 @@ class Course:
         """Tell whether a hit is known to fall on the horizon exactly."""
         if self.exact is None or self.end is None or is_below(hit.time, self.horizon):
             return False
-        return rational.is_zero(self.scene, self.exact, hit.wall, self.end)
+        return rational.is_zero(self.table, self.exact, hit.wall, self.end)
 
     def _require_before_end(self, hit: Hit) -> None:
         if not is_below(hit.time, self.horizon):
@@ -229,14 +229,14 @@ class Course:
         for instant in times:
             walls = self._met_at(instant, hits, limit)
             if len(walls) > 1:
-                is_edge = isinstance(self.scene, Mushroom) and "base" in walls and "arc" not in walls
+                is_edge = self.table.is_mushroom and "base" in walls and "arc" not in walls
                 return Undefined("mouth-edge" if is_edge else "corner")
         raise Undecidable("two walls are met together, as far as this precision shows")
 
     def _rational_times(self, state: State) -> list[Fraction]:
         """List the flight times, before the horizon, at which straight walls that stand still are met."""
         times = [rational.crossing_time(state)]
-        times += [rational.straight_time(self.scene, state, wall) for wall in SIDES]
+        times += [rational.straight_time(self.table, state, wall) for wall in SIDES]
         return [time for time in times if time is not None and (self.end is None or time < self.end)]
 
     def _met_at(self, instant: Fraction, hits: list[Hit], limit: Interval | None) -> tuple[Wall, ...]:
@@ -250,7 +250,7 @@ class Course:
             met += ["base"] if crossing == instant else []
         for hit in hits:
             low, high = exact_ends(hit.time)
-            is_met = low <= instant <= high and rational.is_zero(self.scene, self.exact, hit.wall, instant)
+            is_met = low <= instant <= high and rational.is_zero(self.table, self.exact, hit.wall, instant)
             if is_met:
                 met.append(hit.wall)
             elif low <= instant:
@@ -304,7 +304,7 @@ class Course:
         turn, motion = self.motion.timeline.turn, self.motion.at_rest(s)
         if turn is None:
             return False
-        place = wall, motion.flight.x._mpi_, motion.flight.y._mpi_
+        place = wall, ends(motion.flight.x), ends(motion.flight.y)
         if place not in self._never_met:
             arithmetic, start = self.arithmetic, self.arithmetic.zero
             jet, before = partial(motion.wall, wall), arithmetic.number(-1)
@@ -323,14 +323,14 @@ class Course:
 
         It is twice the time to cross the largest extent the table ever has, along either axis.
         """
-        tops = {name: bounds(law) for name, law in laws(self.scene).items()}
-        radius = tops["r"].highest if "r" in tops else 0.0
-        depth = tops["h"].highest if "h" in tops else 0.0
-        tilt = max(abs(tops["slope"].lowest), abs(tops["slope"].highest)) if "slope" in tops else 0.0
-        number, upper = self.arithmetic.number, self.arithmetic.upper
-        half = number(max(radius, tops["w"].highest if "w" in tops else 0.0)) + number(tilt) * number(depth)
+        number = self.arithmetic.number
+        upper = self.arithmetic.upper
+        radius = number(self.table.radius)
+        depth = number(self.table.depth)
+        widest = max(self.table.radius, self.table.half_width)
+        half = number(widest) + number(self.table.tilt) * depth
         times = []
-        for speed, extent in ((self.flight.vx, 2 * half), (self.flight.vy, number(radius) + number(depth))):
+        for speed, extent in ((self.flight.vx, 2 * half), (self.flight.vy, radius + depth)):
             if sign(speed) != 0:
                 size = speed if sign(speed) > 0 else -speed
                 times.append(upper(2 * extent / size))

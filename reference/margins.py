@@ -34,7 +34,7 @@ def measure(course: Course, hit: Hit) -> Margins:
 
 def neighbours(course: Course, wall: Wall) -> tuple[Wall, ...]:
     """Return the walls that bound the part of the table in which this wall is met."""
-    present = course.scene.walls
+    present = course.table.walls
     if wall == "arc" or (wall == "base" and "arc" in present):
         return ("arc", "base")
     return SIDES if "arc" in present else ("base", *SIDES)

@@ -22,6 +22,7 @@ from reference.arithmetic import Arithmetic, Exhausted, Interval, Undecidable, W
 from reference.course import FOR_EVER, Course, Hit
 from reference.jacobian import chained, enclosures, identity, step_jacobian
 from reference.margins import measure
+from reference.prepared import Prepared, prepare
 from reference.start import depart
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import (
@@ -29,7 +30,6 @@ from scene import (
     Rejected,
     Scene,
     State,
-    Stem,
     Undecided,
     Undefined,
     check_count,
@@ -73,11 +73,13 @@ def next_collision(
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1. Method: isolate, exclude, refine.
     """
     digits = checked_digits(scene, digits)
-    work, least = WorkLimit(), digits + GUARD_DIGITS
+    table = prepare(scene)
+    least = digits + GUARD_DIGITS
+    work = WorkLimit()
 
     def follow(working: int) -> Trajectory:
         arithmetic = Arithmetic(working, work)
-        return _follow(arithmetic, scene, state, t_end, 1, digits, is_differentiated, is_measured)
+        return _follow(arithmetic, table, state, t_end, 1, digits, is_differentiated, is_measured)
 
     try:
         state = check_numbers(scene, state, t_end)
@@ -118,12 +120,13 @@ def trajectory(
     if t_end is not None:
         t_end = check_number("t_end", t_end)
     state = check_numbers(scene, state, sys.float_info.max if t_end is None else t_end)
+    table = prepare(scene)
     if working is not None:
         working = check_count("working", working, 1, MAX_DIGITS)
-        return _follow(Arithmetic(working), scene, state, t_end, n_collisions, None, is_differentiated)
+        return _follow(Arithmetic(working), table, state, t_end, n_collisions, None, is_differentiated)
 
     def follow(digits_now: int) -> Trajectory:
-        return _follow(Arithmetic(digits_now), scene, state, t_end, n_collisions, digits, is_differentiated)
+        return _follow(Arithmetic(digits_now), table, state, t_end, n_collisions, digits, is_differentiated)
 
     most = 8 * (digits + GUARD_DIGITS + n_collisions)
     return _decided(follow, digits + GUARD_DIGITS + n_collisions // 4, most)
@@ -170,7 +173,7 @@ def require_digits(found: ProvedCollision, digits: int) -> None:
 
 def _follow(
     arithmetic: Arithmetic,
-    scene: Scene,
+    table: Prepared,
     state: State,
     t_end: float | None,
     n_collisions: int,
@@ -187,7 +190,7 @@ def _follow(
     steps: list[ProvedCollision] = []
     outcome: Outcome | None
     try:
-        course = depart(arithmetic, scene, state, None if t_end is None else Fraction(float(t_end)))
+        course = depart(arithmetic, table, state, None if t_end is None else Fraction(float(t_end)))
         if isinstance(course, Undefined):
             # Nothing comes next, and nothing need come where no step is asked for, or no time is left.
             end = arrived(arithmetic, state) if t_end == state.t else course
@@ -263,11 +266,12 @@ def bounce(course: Course, hit: Hit) -> Bounce:
 
 def fly_on(course: Course, hit: Hit, after: Bounce) -> Course:
     """Return the flight that follows a hit. The wall keeps its residual if it was left before."""
-    arithmetic, scene = course.arithmetic, course.scene
+    arithmetic = course.arithmetic
+    table = course.table
     leaving = {hit.wall: course.leaving.get(hit.wall, arithmetic.zero)}
-    in_cap = hit.wall == "arc" or (hit.wall == "base" and not isinstance(scene, Stem))
+    in_cap = hit.wall == "arc" or (hit.wall == "base" and not table.is_stem)
     end = None if course.end is None else course.end + course.flight.instant - after.flight.instant
-    return Course(scene, MovingWalls(arithmetic, scene, after.flight), leaving, False, in_cap, end, None)
+    return Course(table, MovingWalls(arithmetic, table, after.flight), leaving, False, in_cap, end, None)
 
 
 def collision(course: Course, hit: Hit, after: Bounce) -> ProvedCollision:

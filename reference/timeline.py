@@ -24,9 +24,10 @@ from typing import Any
 
 from reference.arithmetic import Arithmetic, Interval, exact_ends, is_below, sign
 from reference.jets import Jet, united
-from scene import BangBang, Fourier, Law, Scene
-from scene.laws import Quadratic, breakpoints, is_constant, leg_at
-from scene.tables import laws, period
+from reference.prepared import Prepared
+from scene import BangBang, Fourier, Law
+from scene.mpmath_internals import ends
+from scene.pieces import PolynomialPiece
 
 ORDER = 8
 # In evaluations of a parabola, as measured: a wave; an expansion, and a wave of it.
@@ -38,14 +39,13 @@ class Timeline:
 
     Args:
         arithmetic: working precision.
-        scene: table and laws.
+        table: the scene, prepared.
         instant: the absolute time from which times are counted [time].
     """
 
-    def __init__(self, arithmetic: Arithmetic, scene: Scene, instant: Fraction) -> None:
-        self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in laws(scene).items()}
-        shared = period(scene)
-        length = None if shared is None else shared.value(arithmetic.context)
+    def __init__(self, arithmetic: Arithmetic, table: Prepared, instant: Fraction) -> None:
+        self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in table.laws.items()}
+        length = None if table.cycle is None else table.cycle.value(arithmetic.context)
         self.turn = None if length is None else arithmetic.upper(length)  # a period at least
         self._arithmetic = arithmetic
         # Particles at rest at several places ask for the same parts of a period.
@@ -53,7 +53,7 @@ class Timeline:
 
     def jet(self, name: str, s: Interval) -> Jet:
         """Enclose a law and its derivatives at every time within s."""
-        key = name, s._mpi_
+        key = name, ends(s)
         if key in self._known:
             self._arithmetic.spend(1)
         else:
@@ -72,14 +72,17 @@ class Timeline:
 
 def law_in_time(arithmetic: Arithmetic, law: Law, instant: Fraction) -> LawInTime:
     """Return a law as a function of the time since an instant."""
-    if isinstance(law, Fourier):
-        return Constant(arithmetic, law.mean) if is_constant(law) else Waves(arithmetic, law, instant)
-    if isinstance(law, BangBang):
-        return Constant(arithmetic, law.knots[0][1]) if is_constant(law) else Legs(arithmetic, law, instant)
-    return Constant(arithmetic, law)
+    if law.is_constant:
+        return Level(arithmetic, law.level)
+    match law:
+        case Fourier():
+            return Waves(arithmetic, law, instant)
+        case BangBang():
+            return Legs(arithmetic, law, instant)
+    raise TypeError(f"{type(law).__name__}: the reference does not enclose this kind of law")
 
 
-class Constant:
+class Level:
     """A law that never changes."""
 
     def __init__(self, arithmetic: Arithmetic, value: float) -> None:
@@ -102,8 +105,10 @@ class Legs:
     """A bang-bang law: parabolas that join smoothly."""
 
     def __init__(self, arithmetic: Arithmetic, law: BangBang, instant: Fraction) -> None:
-        self.arithmetic, self.law, self.instant = arithmetic, law, instant
-        self.period = Fraction(law.knots[-1][0]) - Fraction(law.knots[0][0])
+        self.arithmetic = arithmetic
+        self.law = law
+        self.instant = instant
+        self.period = law.length
 
     def jet(self, s: Interval) -> Jet:
         """Unite the parabolas that times within s may lie on."""
@@ -112,7 +117,7 @@ class Legs:
             return self._whole()
         parts = []
         while True:
-            piece = leg_at(self.law, low)
+            piece = self.law.leg_at(low)
             stop = min(piece.end, high)
             part = self.arithmetic.between(low - self.instant, stop - self.instant)
             parts.append(self._on(piece, part))
@@ -120,22 +125,25 @@ class Legs:
                 return united(self.arithmetic, parts)
             low = stop
 
-    def _on(self, piece: Quadratic, s: Interval) -> Jet:
+    def _on(self, piece: PolynomialPiece, s: Interval) -> Jet:
         """Evaluate one parabola at times since the instant."""
         self.arithmetic.spend(1)
         number = self.arithmetic.number
-        u, bend = number(self.instant - piece.origin) + s, number(2 * piece.c2)
-        return Jet(number(piece.c0) + bend * self.arithmetic.square(u) / 2, bend * u, bend)
+        at_rest, _, half_bend = piece.coefficients
+        u = number(self.instant - piece.origin) + s
+        bend = number(2 * half_bend)
+        return Jet(number(at_rest) + bend * self.arithmetic.square(u) / 2, bend * u, bend)
 
     def _whole(self) -> Jet:
         """Enclose the law over all of its period."""
         arithmetic = self.arithmetic
         arithmetic.spend(1)
-        legs = [(leg_at(self.law, start), end - start) for start, end in pairwise(breakpoints(self.law))]
-        speed = max(abs(2 * piece.c2) * length for piece, length in legs)
-        bend = max(abs(2 * piece.c2) for piece, _ in legs)
+        lengths = [end - start for start, end in pairwise(self.law.breakpoints())]
+        bends = [abs(2 * leg.coefficients[2]) for leg in self.law.half_legs]
+        speed = max(bend * length for bend, length in zip(bends, lengths, strict=True))
+        bend = max(bends)
         both = arithmetic.context.mpf([-1, 1])
-        whole = arithmetic.union([arithmetic.number(piece.c0) for piece, _ in legs])
+        whole = arithmetic.union([arithmetic.number(leg.coefficients[0]) for leg in self.law.half_legs])
         return Jet(whole, arithmetic.number(speed) * both, arithmetic.number(bend) * both)
 
     def knots(self, low: Fraction, high: Fraction) -> list[Fraction]:
@@ -143,10 +151,10 @@ class Legs:
         found: list[Fraction] = []
         if high - low >= self.period:
             return found
-        end = leg_at(self.law, self.instant + low).end
+        end = self.law.leg_at(self.instant + low).end
         while end < self.instant + high:
             found.append(end - self.instant)
-            end = leg_at(self.law, end).end
+            end = self.law.leg_at(end).end
         return found
 
     def is_whole(self, length: Fraction) -> bool:
@@ -245,4 +253,4 @@ class Waves:
         return exact_ends(self.omega)[0] * length >= 7
 
 
-LawInTime = Constant | Legs | Waves  # a law as a function of the time since an instant
+LawInTime = Level | Legs | Waves  # a law as a function of the time since an instant

@@ -10,13 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from fractions import Fraction
-from functools import partial
+from functools import partial, reduce
 from typing import Any, NamedTuple
 
 from reference.arithmetic import Arithmetic, Interval
 from reference.jets import Jet, add, multiply, negative, square
+from reference.prepared import Prepared
 from reference.timeline import Timeline
-from scene import Scene, Stem, Wall
+from scene import Wall
+from scene.mpmath_internals import ends
 
 
 class EnclosedFlight(NamedTuple):
@@ -38,7 +40,7 @@ class EnclosedFlight(NamedTuple):
 
 
 def wall_function(
-    scene: Scene,
+    table: Prepared,
     wall: Wall,
     x: Jet,
     y: Jet,
@@ -48,7 +50,7 @@ def wall_function(
     """Return f, f', f'' of a wall for a particle at (x, y).
 
     Args:
-        scene: the table.
+        table: the scene, prepared.
         wall: one of its walls.
         x: of the particle, as a function of time.
         y: likewise.
@@ -56,7 +58,7 @@ def wall_function(
         square_of: returns a square.
     """
     if wall == "base":
-        return negative(y) if isinstance(scene, Stem) else y
+        return negative(y) if table.is_stem else y
     if wall == "floor":
         return add(y, law("h"))
     if wall == "arc":
@@ -68,11 +70,11 @@ def wall_function(
 class MovingWalls:
     """Evaluates the walls along a flight."""
 
-    def __init__(self, arithmetic: Arithmetic, scene: Scene, flight: EnclosedFlight) -> None:
+    def __init__(self, arithmetic: Arithmetic, table: Prepared, flight: EnclosedFlight) -> None:
         self.arithmetic = arithmetic
         self.flight = flight
-        self.scene = scene
-        self.timeline = Timeline(arithmetic, scene, flight.instant)
+        self.table = table
+        self.timeline = Timeline(arithmetic, table, flight.instant)
         # Neighbouring intervals share ends, and later proofs reuse results of earlier ones.
         self._known: dict[tuple[Wall, Any], Jet] = {}
 
@@ -89,13 +91,11 @@ class MovingWalls:
 
     def width(self, s: Interval) -> Jet:
         """Enclose the half-width w of the mouth, w = nu r where nu is given."""
-        if "nu" in self.timeline.laws:
-            return multiply(self.law("nu", s), self.law("r", s))
-        return self.law("w", s)
+        return reduce(multiply, (self.law(name, s) for name in self.table.width))
 
     def wall(self, wall: Wall, s: Interval) -> Jet:
         """Enclose f, f', f'' of a wall over flight times s."""
-        key = wall, s._mpi_
+        key = wall, ends(s)
         if key in self._known:
             self.arithmetic.spend(1)
         else:
@@ -109,7 +109,7 @@ class MovingWalls:
         def law(name: str) -> Jet:
             return self.width(s) if name == "w" else self.law(name, s)
 
-        return wall_function(self.scene, wall, x, y, law, partial(square, self.arithmetic))
+        return wall_function(self.table, wall, x, y, law, partial(square, self.arithmetic))
 
     def gradient(self, wall: Wall, s: Interval) -> tuple[Interval, Interval, Interval]:
         """Enclose the partial derivatives of f by x, y and t at flight time s."""
@@ -119,7 +119,7 @@ class MovingWalls:
             return -2 * (q.x + q.vx * s), -2 * (q.y + q.vy * s), f_t
         if wall in ("left", "right"):
             return (-one if wall == "right" else one), self.law("slope", s).f, f_t
-        is_down = wall == "base" and isinstance(self.scene, Stem)
+        is_down = wall == "base" and self.table.is_stem
         return zero, -one if is_down else one, f_t
 
     def hessian(self, wall: Wall, s: Interval) -> tuple[Interval, Interval, Interval, Interval]:

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpmath import fp
 
-from scene.laws import value
+from scene.laws import Constant
 from scene.precision import decimals, reduce_record
 from scene.states import ON_WALL, State
-from scene.tables import Cap, Scene, Stem, Wall, laws, width_factors
+from scene.tables import Cap, Scene, Stem, Wall
 
 DIGITS = 50  # to which `rounded` evaluates laws before it rounds them
 
@@ -175,9 +175,7 @@ def half_width(ctx: Any, scene: Scene, t: Any) -> Any:
 
     With `fp` t may be an array of times.
     """
-    if isinstance(scene, Cap):
-        return ctx.mpf(0)
-    return math.prod(value(ctx, law, t) for law in width_factors(scene))
+    return scene.width.value(ctx, t)
 
 
 def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
@@ -185,13 +183,9 @@ def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
 
     With `fp` t may be an array of times: what moves is then an array, too.
     """
-    given = laws(scene)
-    now, rate = ({name: value(ctx, law, t, order) for name, law in given.items()} for order in (0, 1))
-    if "nu" in given:
-        now["w"] = now["nu"] * now["r"]
-        rate["w"] = rate["nu"] * now["r"] + now["nu"] * rate["r"]
-    numbers = (column.get(name, ctx.mpf(0)) for column in (now, rate) for name in ("r", "w", "h", "slope"))
-    return TableAt(scene, *numbers)
+    known = {**scene.laws, "w": scene.width}
+    laws = [known.get(name, Constant(0.0)) for name in ("r", "w", "h", "slope")]
+    return TableAt(scene, *(law.value(ctx, t, order) for order in (0, 1) for law in laws))
 
 
 def rounded(scene: Scene, t: float) -> TableAt:

@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from scene.laws import MAX_HARMONICS, MAX_KNOTS, BangBang, Fourier
+from scene.laws import MAX_HARMONICS, MAX_KNOTS, WRITTEN
 from scene.refusal import InvalidScene, shown
 from scene.tables import HIDDEN, PARAMETERS, Cap, Mushroom, Scene, Stem, check_scene
 
@@ -122,7 +122,7 @@ def _in_words(error: Exception, data: Any) -> str:
 
 def _kinds(place: str) -> dict[str, Any]:
     """Return the laws by their kinds, or at the top the tables by theirs."""
-    valid = (Fourier, BangBang) if place else (Cap, Stem, Mushroom)
+    valid = WRITTEN if place else (Cap, Stem, Mushroom)
     return {str(kind.__struct_config__.tag): kind for kind in valid}
 
 

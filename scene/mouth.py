@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import chebyshev
 
-from scene.laws import BangBang, Fourier, Law, bounds, breakpoints, is_constant, values
-from scene.tables import Mushroom, Scene, laws
+from scene.laws import Constant, Law, first_origin
+from scene.tables import Mushroom, Scene
 
 FloatArray = npt.NDArray[np.float64]
 # Returns a law, its first and its second derivative by the phase, shape (3, ...), at phases given.
@@ -32,8 +32,8 @@ TO_SERIES = np.linalg.inv(chebyshev.chebvander(NODES, DEGREE)).T
 
 
 def start_time(scene: Scene) -> float:
-    """Return when the cycle begins [time]: at the first knot of a bang-bang law, else at 0."""
-    return next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
+    """Return when the cycle begins [time]: at the first knot of a law that has knots, else at 0."""
+    return first_origin(scene.laws.values())
 
 
 def one_cycle(scene: Scene) -> float:
@@ -43,10 +43,9 @@ def one_cycle(scene: Scene) -> float:
 
 def mouth_factors(scene: Mushroom) -> tuple[Law, Law]:
     """Return two laws whose quotient is nu."""
-    if scene.nu is not None:
-        return scene.nu, 1.0
-    assert scene.w is not None
-    return scene.w, scene.r
+    if "nu" in scene.laws:
+        return scene.laws["nu"], Constant(1.0)
+    return scene.laws["w"], scene.laws["r"]
 
 
 @lru_cache(maxsize=256)
@@ -65,9 +64,10 @@ def mouth_minima(scene: Scene) -> tuple[float, ...]:
     if not isinstance(scene, Mushroom):
         return ()
     width, radius = mouth_factors(scene)
-    if is_constant(width) and is_constant(radius):
+    if width.is_constant and radius.is_constant:
         return ()
-    start, span = start_time(scene), scene.period
+    start = start_time(scene)
+    span = scene.period
     w, r = (_motion(law, start, span) for law in (width, radius))
     cuts = _cuts(start, span, (width, radius))
     # Legs too short for their squares give nan: their zeros drop out, their ends among the cuts stay.
@@ -85,19 +85,19 @@ def _in_cycle(phase: float) -> float:
 
 def _motion(law: Law, start: float, span: float) -> Motion:
     """Return a law's motion over a cycle, divided by its highest value: only the ratios of nu matter."""
-    highest = bounds(law).highest
+    highest = law.bounds().highest
 
     def motion(u: FloatArray) -> FloatArray:
-        return np.stack([values(law, start + span * u, order) / highest * span**order for order in range(3)])
+        return np.stack([law.values(start + span * u, order) / highest * span**order for order in range(3)])
 
     return motion
 
 
 def _cuts(start: float, span: float, factors: tuple[Law, Law]) -> FloatArray:
     """Return phases from 0 to 1 between which N is analytic and its waves make half a turn at most."""
-    waves = [law.harmonics() for law in factors if isinstance(law, Fourier) and law.harmonics()]
+    waves = [law.harmonics() for law in factors if law.harmonics()]
     parts = 2 * sum(harmonics[-1][0] for harmonics in waves)
-    knots = [float(t - Fraction(start)) / span for law in factors for t in breakpoints(law)]
+    knots = [float(t - Fraction(start)) / span for law in factors for t in law.breakpoints()]
     return np.unique(np.concatenate([np.linspace(0.0, 1.0, max(parts, 1) + 1), np.array(knots) % 1.0]))
 
 

@@ -15,12 +15,11 @@ system uses `reduce_record`.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from typing import Any
 
 from mpmath import MPContext, mp
-from mpmath.ctx_iv import MPIntervalContext
-from mpmath.libmp import libelefun, libmpi
+
+from scene import mpmath_internals as raw
 
 CONSTANTS = threading.Lock()
 
@@ -125,47 +124,22 @@ def decimals(digits: int = 15) -> Any:
 def intervals(bits: int) -> Any:
     """Return mpmath's intervals with ends of so many bits, an `MPIntervalContext`."""
     if bits not in _MADE.intervals:
-        _MADE.intervals[bits] = system = MPIntervalContext()
+        _MADE.intervals[bits] = system = raw.MPIntervalContext()
         system.prec = bits
         _make_quick(system, bits)
     return _MADE.intervals[bits]
 
 
 def _make_quick(system: Any, bits: int) -> None:
-    """Spare sums, differences, products and quotients of two intervals of a system mpmath's search for kinds.
-
-    What is computed, and by which functions of mpmath's, is the same; all else goes the old way. Cosine and
-    sine are computed together, and pi once.
-    """
-    kind = system.mpf
+    """Spare a system's intervals mpmath's search for kinds; compute cosine and sine together, and pi once."""
 
     def cos_sin(x: Any) -> tuple[Any, Any]:
         with CONSTANTS:
-            cos, sin = libmpi.mpi_cos_sin(x._mpi_, bits)
+            cos, sin = raw.interval_cos_sin(raw.ends(x), bits)
         return system.make_mpf(cos), system.make_mpf(sin)
 
     system.cos_sin = cos_sin
     with CONSTANTS:
-        system.pi = system.make_mpf((libelefun.mpf_pi(bits, "f"), libelefun.mpf_pi(bits, "c")))
-    for name, function in (
-        ("__add__", libmpi.mpi_add),
-        ("__sub__", libmpi.mpi_sub),
-        ("__mul__", libmpi.mpi_mul),
-        ("__truediv__", libmpi.mpi_div),
-    ):
-        setattr(kind, name, _quick(kind, bits, function, getattr(kind, name)))
-
-
-def _quick(
-    kind: Any, bits: int, function: Callable[[Any, Any, int], Any], general: Callable[[Any, Any], Any]
-) -> Callable[[Any, Any], Any]:
-    new = object.__new__
-
-    def operate(a: Any, b: Any) -> Any:
-        if type(b) is not kind:
-            return general(a, b)
-        found: Any = new(kind)
-        found._mpi_ = function(a._mpi_, b._mpi_, bits)
-        return found
-
-    return operate
+        system.pi = system.make_mpf((raw.pi(bits, raw.DOWN), raw.pi(bits, raw.UP)))
+    for name in raw.INTERVAL_OPERATIONS:
+        setattr(system.mpf, name, raw.quick_operation(system.mpf, name, bits))

@@ -6,7 +6,7 @@ line that names the field, the value and the bound, never in a traceback from de
 
 import math
 import numbers
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -121,3 +121,20 @@ def shown(value: object) -> str:
 
 def _is_plain(value: object) -> bool:
     return isinstance(value, numbers.Number | str)
+
+
+def refuse_unheeded(options: Mapping[str, object], why: str) -> None:
+    """Refuse options that nothing here would heed: their user would count on them.
+
+    Args:
+        options: by name; None is one that is not given, True one that has no value.
+        why: nothing heeds them.
+
+    Raises:
+        BadInput: naming the first that is given.
+    """
+    for name, value in options.items():
+        if value is not None:
+            shown = repr(value) if isinstance(value, str) else value
+            given = name if value is True else f"{name} = {shown}"
+            raise BadInput(f"{given} would change nothing here: {why}")

@@ -11,7 +11,6 @@ import json
 import os
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
@@ -23,6 +22,7 @@ from support.entries import kept_entries
 import fast
 from conformance.suite import run as suite
 from conformance.vectors import Vector, load
+from fast.kernel.numba_internals import cache_folder
 from fast.prepared import prepare
 from mushrooms.main import run
 from scene import Scene
@@ -53,14 +53,14 @@ LONGEST = [
     "test_mushrooms_simulate.py",
     "test_fast_stepper.py",
     "test_fast_lanes.py",
-    "test_conformance_audit.py",
+    "test_mushrooms_audit_claims.py",
     "test_theory_simulated.py",
     "test_theory_finite_energy.py",
     "test_hard_cases.py",
     "test_mushrooms_draw.py",
     "test_mushrooms_claim_figures.py",
     "test_mushrooms_figures.py",
-    "test_conformance_given_ensembles.py",
+    "test_mushrooms_audit_given.py",
     "test_conformance_grading.py",
     "test_mushrooms_check.py",
     "test_theory_upright.py",
@@ -98,7 +98,9 @@ def _compiled_once() -> None:
 
     def one_at_a_time(entry: Dispatcher) -> Callable[[Any], Any]:
         compile_or_load, name = entry.compile, entry.py_func.__qualname__
-        lock = Path(entry.stats.cache_path) / f"{name}.lock"
+        folder = cache_folder(entry)
+        assert folder is not None
+        lock = folder / f"{name}.lock"
 
         def compile_alone(signature: Any) -> Any:
             lock.parent.mkdir(parents=True, exist_ok=True)

@@ -150,6 +150,26 @@ def test_time_stepping_is_right_where_it_is_easy_and_wrong_where_it_skips(drawn)
     assert max(errors) > 0.5
 
 
+def test_time_stepping_tells_how_long_a_flight_lasts_and_when_it_ends():
+    """Of each wall, and through the mouth; the flight begins late, so that its time is not its end's."""
+    for name, state, t_end in (
+        ("breathing-circle", State(3.5, 0.1, 0.2, 0.3, 0.4), 90.0),
+        ("fermi-ulam", State(3.5, 0.1, -0.5, 0.3, 0.4), 90.0),
+        ("moving-cap", State(3.5, 0.02, 0.3, 0.1, -9.0), 90.0),
+        ("moving-cap", State(3.5, 0.02, -0.3, 0.1, 9.0), 90.0),
+        ("moving-cap", State(3.5, 0.02, -0.3, 9.0, 0.5), 90.0),
+        ("moving-cap", State(3.5, 0.02, 0.3, 0.25, 0.125), 3.75),
+    ):
+        scene = load(name)
+        truth = fast.next_collision(scene, state, t_end)
+        found = baselines.next_collision_by(1e-12)(scene, state, t_end)
+        assert type(found) is type(truth)
+        told, right = map(msgspec.to_builtins, (found, truth))
+        assert told.pop("wall", None) == right.pop("wall", None)
+        assert told.pop("outcome", None) == right.pop("outcome", None)
+        assert told == pytest.approx(right, rel=1e-7)
+
+
 def gone(call):
     if call > 2:
         raise CheckFailure("crashed", "gone")

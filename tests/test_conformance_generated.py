@@ -41,7 +41,7 @@ from conformance.mutants.mutant import make_mutant
 from conformance.mutants.walls import UPRIGHT, TieBlind
 from conformance.plain.step import MAX_COLLISIONS, BangBangMotion, ConstantMotion, Flight, PlainPath
 from conformance.suite.checks import checks_of
-from conformance.suite.checks.paths import flaw_of
+from conformance.suite.checks.path_judge import flaw_of
 from conformance.suite.run import Transform, draw_transform
 from conformance.verify import Verdict, verify_line
 from fast import paths

@@ -41,7 +41,7 @@ from conformance.harness import kit
 from conformance.harness.examples import Example, find_examples, find_kit_examples
 from conformance.mutants import COMMON, MUTANTS, PLAIN
 from conformance.suite import checks, reports, run as suite, session
-from conformance.suite.checks import flows, requests, timing
+from conformance.suite.checks import bad_input, flows, timing
 from conformance.suite.checks.form import Draw, run_check
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import VERDICTS
@@ -467,7 +467,7 @@ def test_questions_are_a_strategy_too():
     assert isinstance(scene, Mushroom | Cap | Stem)
 
 
-@pytest.mark.parametrize("asks", [requests.bad_states, requests.bad_scenes])
+@pytest.mark.parametrize("asks", [bad_input.bad_states, bad_input.bad_scenes])
 def test_what_is_asked_as_bad_is_bad_and_the_rest_is_good(asks, tally):
     """The proving stepper says the same of what a check asks, and leaves nothing open."""
     for _, request, why in asks(Draw("1"), "step"):

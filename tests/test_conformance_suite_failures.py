@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from conformance import plain
 from conformance.suite import sheet as sheets
 from conformance.suite.checks.form import Implementation
-from conformance.suite.checks.paths import flaw_of, is_fine
+from conformance.suite.checks.path_judge import flaw_of, is_fine
 from conformance.suite.checks.timing import ask_time
 from conformance.suite.process import CheckFailure, Process, Transcript
 from conformance.suite.session import Limits, Session, read_outcome, with_walls

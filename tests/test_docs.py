@@ -31,9 +31,9 @@ from conformance import plain
 from conformance.cases.generated import ROUND
 from conformance.cases.table import FAMILIES
 from conformance.mutants import MUTANTS
+from conformance.suite.checks.bad_input import MOST_SAMPLES
 from conformance.suite.checks.flows import MAX_STATES
 from conformance.suite.checks.paths import MAX_HITS, MAX_LATE, MAX_WAIT, NEAREST, STEEPEST
-from conformance.suite.checks.requests import MOST_SAMPLES
 from conformance.suite.result import MAX_DECLINED_OF_PART, VERDICTS, declines_too_much
 from conformance.suite.session import read_answer
 from docs import figures, pictures

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import assume, given, settings, strategies as st
 from mpmath import MPContext
 from msgspec.structs import replace
-from numba import njit, types
+from numba import config, njit, types
 from numba.extending import intrinsic
 from support.depth import deep_among, deep_but
 from support.faulty_kernels import faulty_lanes
@@ -54,7 +54,7 @@ def test_the_compiler_packs_divisions_and_square_roots(loop, form):
     function = njit(**HOW)(entry.py_func)  # what the disk cache keeps has no text
     function.compile(worker.STEP.args)
     assert asked_widths(function) == {512}
-    if "+avx2" not in TOOLS[3]:
+    if "+avx2" not in TOOLS[3] or not config.ENABLE_AVX:
         pytest.skip("needs a machine with AVX2: for others the compiler may find that packing does not pay")
     assembly = function.inspect_asm(worker.STEP.args)
     # The guess of the time, its correction and the bounce divide: none of these loops is left unpacked.

@@ -13,9 +13,9 @@ from support.refusals import assert_refused
 
 import scene as scenes
 import theory
-from conformance.audit.ensemble import GivenEnsemble, HighEnergies, checks, expected, reversal
-from mushrooms import audit_ensemble
-from mushrooms.audit_ensemble import Options
+from mushrooms.audit import ensemble_command
+from mushrooms.audit.ensemble_checks import GivenEnsemble, HighEnergies, checks, expected, reversal
+from mushrooms.audit.ensemble_command import Reading
 
 N = 2_500
 # Ensembles that take longest.
@@ -23,7 +23,7 @@ LONG = ("wrong sign of the wall's speed", "misprinted protocol", "slope 1/9")
 # Of mistakes that few particles show.
 FEW = {"wrong sign of the wall's speed": 400, "starts on the wall": 400, "half a period": 400}
 SCENE = scenes.load("moving-cap")
-PLAIN = Options(practice_engine.ENERGY, "v2/2", None, None)
+PLAIN = Reading(practice_engine.ENERGY, "v2/2", None, None)
 # What the report says of each of `practice_engine.ENSEMBLES`; nothing of those that pass.
 CAUSES = {
     "right": "",
@@ -62,7 +62,7 @@ def test_a_mistake_is_refuted_and_its_cause_is_named(name, tmp_path, right):
     columns = write_down(
         practice_engine.ensemble(FEW.get(name, N), 41, **switches) if switches else dict(right)
     )
-    result = audit_ensemble.examine(write(tmp_path / "e.csv", columns), SCENE, None, PLAIN)
+    result = ensemble_command.examine(write(tmp_path / "e.csv", columns), SCENE, None, PLAIN)
     assert result.verdict == ("refuted" if CAUSES[name] else "confirmed"), result.checks
     assert CAUSES[name] in " ".join(result.causes)
     assert bool(result.causes) == bool(CAUSES[name])
@@ -71,7 +71,7 @@ def test_a_mistake_is_refuted_and_its_cause_is_named(name, tmp_path, right):
 def test_missing_particles_are_told_from_wrong_physics(tmp_path, right):
     kept = {name: column[: N - 200] for name, column in right.items()}
     path = write(tmp_path / "e.csv", kept)
-    result = audit_ensemble.examine(path, SCENE, None, PLAIN._replace(particles=N))
+    result = ensemble_command.examine(path, SCENE, None, PLAIN._replace(particles=N))
     assert [check.what for check in result.checks if check.holds is False] == ["every particle has an energy"]
     assert "8.0% of the particles are missing" in result.causes[0]
 
@@ -79,9 +79,9 @@ def test_missing_particles_are_told_from_wrong_physics(tmp_path, right):
 def test_a_seeded_sample_of_theory_passes_in_other_units_and_forms(tmp_path, right):
     cycles = {**right, "t_in": right["t_in"] / (2 * np.pi), "t_out": right["t_out"] / (2 * np.pi)}
     doubled = {**cycles, "E0": 2 * cycles["E0"], "E1": 2 * cycles["E1"]}
-    options = Options(None, "v2", None, None)
-    given, notes = audit_ensemble.read(write(tmp_path / "e.csv", doubled), SCENE, options)
-    here, _ = audit_ensemble.read(write(tmp_path / "f.csv", right), SCENE, PLAIN)
+    options = Reading(None, "v2", None, None)
+    given, notes = ensemble_command.read(write(tmp_path / "e.csv", doubled), SCENE, options)
+    here, _ = ensemble_command.read(write(tmp_path / "f.csv", right), SCENE, PLAIN)
     assert given.energy == practice_engine.ENERGY
     assert "times are taken as parts of a cycle, inferred" in notes
     assert np.nanmax(np.abs(given.t_in - here.t_in)) < 1e-12
@@ -92,7 +92,7 @@ def test_a_seeded_sample_of_theory_passes_in_other_units_and_forms(tmp_path, rig
     cells = [["" if np.isnan(x) else float(x).hex() for x in column] for column in right.values()]
     (tmp_path / "hex.csv").write_text("\n".join(map(",".join, [list(right), *zip(*cells, strict=True)])))
     for form in ("e.parquet", "e.zarr", "hex.csv"):
-        same, _ = audit_ensemble.read(tmp_path / form, SCENE, PLAIN)
+        same, _ = ensemble_command.read(tmp_path / form, SCENE, PLAIN)
         assert np.array_equal(same.s, here.s)
         assert np.array_equal(same.t_out, here.t_out, equal_nan=True)
 
@@ -113,7 +113,7 @@ def test_further_cycles_are_held_to_sums(tmp_path):
     for later, verdict in ((s, "confirmed"), (np.diff(s, axis=1, prepend=0.0), "refuted")):
         energies = {f"E{k + 1}": 1e6 * np.exp(later[:, k]) for k in (2, 0, 1)}
         path = write(tmp_path / "e.csv", {"E0": np.full(len(s), 1e6), **energies})
-        result = audit_ensemble.examine(path, SCENE, None, PLAIN._replace(energy=None))
+        result = ensemble_command.examine(path, SCENE, None, PLAIN._replace(energy=None))
         assert result.verdict == verdict, result.checks
         assert {"log E2/E0", "mean of log E3/E0"} <= {check.what for check in result.checks}
 

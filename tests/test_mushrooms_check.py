@@ -18,6 +18,7 @@ from support.faulty_servers import command
 from support.pages import assert_stands_alone
 
 import conformance
+import reference
 import scene as scenes
 from conformance import plain, vectors
 from conformance.bench import record, workloads
@@ -25,9 +26,10 @@ from conformance.harness.examples import find_compiler
 from conformance.suite import pytest_suite, run as suite
 from conformance.suite.checks import flows
 from conformance.suite.session import Session
-from mushrooms import bench, output
+from mushrooms import bench, progress
 from mushrooms.reports import bench_page, check_page
 from scene import State
+from scene.refusal import shown
 
 PYTHON = [sys.executable, str(Path(conformance.__file__).parent / "harness" / "python" / "stepper.py")]
 
@@ -42,7 +44,7 @@ def _few(monkeypatch):
     monkeypatch.setattr(suite, "choose", lambda *_: found)
     monkeypatch.setitem(flows.SIZES, "core", flows.Size(20, 50.0, 0.5))
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
-    monkeypatch.setattr(output, "FIRST", math.inf)
+    monkeypatch.setattr(progress, "FIRST", math.inf)
     monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1] + workloads.RULES[2:3])
     monkeypatch.setattr(bench, "QUESTIONS", {"quick": 2, "full": 64})
     monkeypatch.setattr(bench, "FURTHER", {"quick": 40, "full": 2000})
@@ -116,8 +118,8 @@ def test_a_bad_stepper_is_not_and_its_fault_is_told(command_line, tmp_path, step
 
 
 def test_a_piped_run_tells_on_stderr_how_far_it_is(command_line, monkeypatch):
-    monkeypatch.setattr(output, "FIRST", 0.0)
-    monkeypatch.setattr(output, "EVERY", 0.0)
+    monkeypatch.setattr(progress, "FIRST", 0.0)
+    monkeypatch.setattr(progress, "EVERY", 0.0)
     _, _, err = command_line("check", "--groups", "static-stem", "--", *command("honest"))
     lines = err.splitlines()
     assert len(lines) > 5
@@ -283,6 +285,22 @@ def test_a_right_trajectory_is_proved_and_a_false_step_is_drawn(tmp_path, comman
     for options, expected in ((("--all", "--within", "1e6"), 0), (("--within", "0"), 1)):
         code, out, _ = command_line("verify", lines_of_json, *options)
         assert (code, " agree within " in out) == (expected, True)
+
+
+@pytest.mark.parametrize("outcome", [scenes.Undecided("shy"), scenes.Undefined("corner")])
+def test_a_false_step_without_a_certified_end_is_not_drawn(tmp_path, command_line, monkeypatch, outcome):
+    """The verifier may refuse a step that the reference cannot end."""
+    cap = scenes.load("moving-cap")
+    [hit] = plain.trajectory(cap, START, 1, 1e9)
+    row = {name: getattr(hit, name) for name in FIELDS}
+    scene = {name: law for name, law in scenes.to_data(cap).items() if name not in ("name", "notes")}
+    state = {name: getattr(START, name) for name in FIELDS}
+    path, picture = tmp_path / "steps.json", tmp_path / "false.svg"
+    path.write_text(json.dumps({"scene": scene, "state": state, "steps": [{**row, "x": row["x"] + 0.01}]}))
+    monkeypatch.setattr(reference, "next_collision", lambda *_: outcome)
+    code, _, err = command_line("verify", path, "--picture", picture)
+    assert (code, picture.exists()) == (2, False)
+    assert err == f"mushrooms: --picture: step 1 from {shown(str(START))} has no certified end to draw\n"
 
 
 def test_a_wall_that_is_missing_from_a_table_is_named(tmp_path, command_line):

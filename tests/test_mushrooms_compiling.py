@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from numba import config
@@ -11,9 +12,9 @@ from numba.core import event
 from support.entries import kept_entries
 
 import fast
-from conformance.audit import session
 from fast.kernel import fine_step, follow, path, scalar_step, worker
-from mushrooms import bench, orbits, output, questions
+from mushrooms import bench, orbits, progress, questions
+from mushrooms.audit import session
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled without the compiler")
 ROOT = Path(__file__).parent.parent
@@ -48,7 +49,7 @@ def test_each_kernel_that_takes_long_is_announced_and_no_other(capsys):
     assert len(entries) > 30
     announced = {}
     for entry in entries:
-        with output.announce_compilation():
+        with progress.announce_compilation():
             compile_again(entry)
         announced.setdefault(capsys.readouterr().err, set()).add(entry.py_func.__name__)
     assert announced == {
@@ -62,9 +63,34 @@ def test_each_kernel_that_takes_long_is_announced_and_no_other(capsys):
 
 def test_what_is_compiled_together_is_announced_once(capsys):
     loops = [*worker.FLIES.values(), *worker.CHORDS.values(), *path.PATHS.values()]
-    with output.announce_compilation():
+    with progress.announce_compilation():
         compile_again(scalar_step.scalar_step, *loops, follow.follow_particles, fine_step.fine_path)
     assert capsys.readouterr().err == SLOW + FINE
+
+
+@pytest.mark.parametrize(
+    ("module", "cache", "said"),
+    [
+        ("fast.kernel.worker", "kept", SLOW),
+        (
+            "fast.kernel.worker",
+            "",
+            SLOW.replace("kept for next time", "no folder can be written in to keep it"),
+        ),
+        ("faster.worker", "kept", ""),
+        ("somebody.worker", "kept", ""),
+    ],
+)
+def test_only_our_kernels_are_announced_and_whether_they_are_kept(capsys, module, cache, said):
+    """A program beside ours may compile a function that is called as one of ours."""
+
+    def loop():
+        """Stand for a kernel."""
+
+    loop.__module__ = module
+    with progress.announce_compilation():
+        compile_again(SimpleNamespace(py_func=loop, stats=SimpleNamespace(cache_path=cache)))
+    assert capsys.readouterr().err == said
 
 
 @pytest.mark.parametrize(

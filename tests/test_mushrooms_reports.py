@@ -14,14 +14,13 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from mpmath import fp
-from support.artists import bars, line, words, xy
+from support.artists import bars, line, said, words, xy
 
 import conformance
 import fast
+import reference
 import theory
 from conformance import vectors
-from conformance.audit.claim import Check
-from conformance.audit.ensemble import GivenEnsemble
 from conformance.bench import record, scoreboard
 from conformance.grading.agreement import middle
 from conformance.harness.examples import Example
@@ -29,10 +28,14 @@ from conformance.suite import Result, Run
 from conformance.suite.result import Speed
 from conformance.suite.session import Limits
 from fast.batch import careful_steps, fine_steps, lane_steps
-from mushrooms import audit_ensemble, bench, check
+from mushrooms import bench, check
+from mushrooms.audit import ensemble_command
+from mushrooms.audit.claim import Check
+from mushrooms.audit.ensemble_checks import GivenEnsemble
+from mushrooms.audit.page import pull
 from mushrooms.figures import style
 from mushrooms.reports import bench_page, check_page
-from mushrooms.reports.page import number, pull
+from mushrooms.reports.page import number
 from scene import BadInput, Horizon, State, from_data, load
 from scene.geometry import table_at
 
@@ -49,7 +52,7 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
         return b"<svg/>"
 
     monkeypatch.setattr(style, "svg", note)
-    for module in (audit_ensemble,):
+    for module in (ensemble_command,):
         monkeypatch.setattr(module, "svg", note)
     return seen
 
@@ -60,11 +63,15 @@ def test_the_growth_of_errors_is_drawn_for_each_follower(figures):
     [axes] = figures[0].axes
     count = np.arange(1, grown.collisions + 1)
     for name, errors in grown.followers.items():
-        x, y = xy(line(axes, name))
+        one = line(axes, name)
+        x, y = xy(one)
         assert x.tolist() == count.tolist()
         kept = np.array(errors) > 0
         assert y[kept] == pytest.approx(np.array(errors)[kept])
         assert np.isnan(y[~kept]).all()  # no error has no place on a logarithmic axis
+        assert (
+            one.get_markevery() == grown.collisions // 16
+        )  # some marks, one at each collision of a short path
     assert xy(line(axes, "one ulp a step, grown"))[1] == pytest.approx(grown.bound)
     x, y = xy(line(axes, "Lyapunov slope"))
     assert np.diff(np.log10(y)) == pytest.approx(grown.rate)
@@ -72,6 +79,16 @@ def test_the_growth_of_errors_is_drawn_for_each_follower(figures):
     assert len(x) == 2 * (grown.collisions // 3)
     assert f"{grown.rate:.2f} decimals a collision" in words(figures[0])
     assert axes.get_yscale() == "log"
+    assert axes.get_ylim() == (1e-60, 10)
+    [names] = said(figures[0])
+    followers = " | ".join(re.sub(r"\d{2,}", "#", name) for name in grown.followers)
+    assert names == (
+        f" | collisions | error, relative to table and speed | {followers} | one ulp a step, grown"
+        " | Lyapunov slope: # decimals a collision"
+    )
+    brief = {name: errors[:9] for name, errors in grown.followers.items()}
+    bench_page.growth(msgspec.structs.replace(grown, collisions=9, followers=brief, bound=grown.bound[:9]))
+    assert {one.get_markevery() for one in figures[1].axes[0].lines if one.get_label() in brief} == {1}
 
 
 def test_the_headline_has_a_mark_for_each_solver_where_its_digits_and_time_are():
@@ -112,6 +129,12 @@ def test_the_headline_has_a_mark_for_each_solver_where_its_digits_and_time_are()
     assert xy(next(one for one in axes.lines if one.get_linestyle() == ":"))[0] == pytest.approx(
         bench_page.BINARY64
     )
+    assert (axes.get_xlim(), axes.get_ylim()) == ((0.65, KEPT.digits), (10, 1e8))
+    assert axes.get_xticks().tolist() == [2**k for k in range(8)]
+    workload = next(w for w in KEPT.workloads if w.name == bench_page.HEADLINE)
+    assert axes.get_title() == f"One core, {workload.name}: {workload.what}"
+    assert axes.get_xlabel() == "correct digits of an answer (mark: median; bar: to the worst)"
+    assert axes.get_ylabel() == "ns per collision"
     other = msgspec.structs.replace(KEPT, workloads=KEPT.workloads[:1])
     assert KEPT.workloads[0].name in bench_page.headline(other).axes[0].get_title()
 
@@ -214,6 +237,51 @@ def test_the_page_of_a_check_lists_the_first_cases_and_counts_the_rest(monkeypat
     assert (BAD[-1].id in text) == (n_left <= 0)
 
 
+def cells(row: str) -> list[str]:
+    return [re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<t[hd].*?</t[hd]>", row, re.S)]
+
+
+def test_the_page_of_a_check_counts_verdicts_by_group():
+    """A verdict that nothing has gets no column, but for pass; a known failure is listed with its mark."""
+    known = [
+        a_result("arc/2", "fail", "as it is", is_known=True),
+        a_result("arc/3", "pass", "after all", is_known=True),
+    ]
+    further = [a_result("property/turn", "pass", "turned"), a_result("profile/time", "fail", "slow")]
+    beyond = a_result("stem/9", "pass", relative=1.0)
+    for results, seen in (
+        ([*GOOD, *BAD, *known, *further, beyond],
+         ["pass", "fail", "declined", "unsupported", "crashed", "timed-out"]),
+        ([a_result("cap/1", "timed-out", "slow")], ["pass", "timed-out"]),
+    ):  # fmt: skip
+        run = a_run(*results)
+        page = check_page.to_html(run)
+        table = page.partition("<h2>Verdicts by group</h2>")[2].partition("</table>")[0]
+        head, *rows = [found for found in map(cells, table.split("</tr>")) if found]
+        assert head == ["Group", "Cases", *seen, "Worst ulps", "A/B/C", "Class"]
+        groups = list(dict.fromkeys(one.group for one in results))
+        assert [row[0] for row in rows] == [*groups, "all"]
+        for row in rows:
+            own = [one for one in results if row[0] in (one.group, "all")]
+            counts = [sum(one.verdict == verdict for one in own) for verdict in seen]
+            assert row[1 : 2 + len(seen)] == [str(n) for n in (len(own), *counts)]
+        listed = page.partition("<h2>All that did not pass</h2>")[2].partition("</table>")[0]
+        rows = [found for found in map(cells, listed.split("</tr>")) if found][1:]
+        assert rows == [
+            [one.id, one.verdict + (" (known)" if one.is_known else ""), one.why]
+            for one in results
+            if one.verdict != "pass" or one.is_known
+        ]
+        listed = page.partition("<h2>Properties and profiles</h2>")[2].partition("</table>")[0]
+        rows = [found for found in map(cells, listed.split("</tr>")) if found][1:]
+        assert rows == [[one.id, one.verdict, one.why] for one in results if one in further]
+    every = cells(check_page.to_html(a_run(*GOOD, beyond)).partition("<h2>Verdicts")[2].partition("total")[2])
+    assert every[:6] == ["all", "4", "4", "inf", "2/1/1", "C"]
+    assert (
+        cells(check_page.to_html(a_run(*GOOD)).partition("<h2>Verdicts")[2].partition("total")[2])[3] == "900"
+    )
+
+
 def test_the_scoreboard_has_a_row_and_the_reasons_of_each_stepper():
     good, bad = a_run(*GOOD), a_run(*GOOD, *BAD, diagnosis=["Like a mutant: stale."], seconds=600.4)
     graded = [
@@ -273,7 +341,11 @@ def test_errors_and_speed_of_a_run_are_drawn(figures):
     assert speed.get_xlim()[0] < 250.0 < speed.get_xlim()[1]
     levels = {float(xy(one)[1][0]) for one in speed.lines if one.get_linestyle() == "--"}
     assert levels == {check_page.SHARP, check_page.FAIR}
-    assert "moving-cap" in speed.get_xlabel()
+    assert speed.get_xlim() == pytest.approx((250.0 / 30, 250.0 * 30))
+    assert errors.get_ylim() == (0.5, -0.5)
+    assert said(figures[0]) == [" | backward ulps of the answers that passed | "]
+    entries = "worst | median | class A ends | class B ends"
+    assert said(figures[1]) == [f" | ns per collision on moving-cap | backward ulps | {entries}"]
 
 
 def a_vector(kind: str) -> vectors.Vector:
@@ -342,7 +414,39 @@ def test_a_step_is_drawn_from_its_start_to_both_ends_with_its_direction(figures)
     ]
     ahead = [d[1] - d[0] for d in directions if len(d) == 2 and d[0].tolist() in ([0.5, 0.6], [0.5, 0.62])]
     assert sorted(np.sign(one).tolist() for one in ahead) == [[1.0, -1.0], [1.0, 1.0]]
-    assert whole.get_legend() is not None
+    assert said(figures[0]) == [
+        " | x [length] | y [length] | certified | given", "close to the end | x [length] | y [length]",
+    ]  # fmt: skip
+
+
+FALSE_STEPS = [  # of a step to x = 0.5, y = 0.6, vx = 1, vy = -1 at t = 1: what is given, and what is said
+    ({"x": 0.5, "y": 0.61}, "y = 0.61, must be 0.6: off by 0.01"),
+    ({"x": 0.48, "y": 0.61}, "x = 0.48, must be 0.5: off by -0.02"),
+    ({"x": 0.49, "y": 0.6, "vx": 1.02}, "vx = 1.02, must be 1: off by 0.02"),  # of sqrt 2
+    ({"x": 0.49, "y": 0.6, "vx": 1.004}, "x = 0.49, must be 0.5: off by -0.01"),
+    ({"x": 0.49, "y": 0.6, "vy": -1.1}, "vy = -1.1, must be -1: off by -0.1"),
+    ({"t": 1.125, "x": 0.49, "y": 0.6}, "t = 1.125, must be 1: off by 0.12"),
+    ({"x": 0.49, "y": 0.6, "wall": None}, "x = 0.49, must be 0.5: off by -0.01"),
+    ({"x": 0.49, "y": 0.6, "wall": "arc"}, "wall = arc, must be None"),
+]
+
+
+@pytest.mark.parametrize(("given", "said"), FALSE_STEPS, ids=range(len(FALSE_STEPS)))
+def test_the_title_of_a_false_step_names_what_is_off_most(figures, given, said):
+    """Times are measured by the time of the step, places by the table's size, velocities by the speed."""
+    state, truth = State(0.0, 0.1, 0.2, 3.0, 4.0), Horizon(1.0, 0.5, 0.6, 1.0, -1.0)
+    check_page.draw_step(load("moving-cap"), state, truth, given, "step 7")
+    assert figures[0].get_suptitle() == f"step 7: {said}"
+
+
+def test_at_time_0_and_at_rest_an_error_is_its_own_measure(figures):
+    state, truth = State(-1.0, 0.1, 0.2, 0.0, 0.0), Horizon(0.0, 0.1, 0.2, 0.0, 0.0)
+    for given, title in (
+        ({"t": 0.1, "x": 0.11, "y": 0.2}, "t = 0.1, must be 0: off by 0.1"),
+        ({"x": 0.11, "y": 0.2, "vy": 0.2}, "vy = 0.2, must be 0: off by 0.2"),
+    ):
+        check_page.draw_step(load("moving-cap"), state, truth, given, "step 1")
+        assert figures[-1].get_suptitle() == f"step 1: {title}"
 
 
 def test_a_page_lists_failures_first_and_else_the_least_precise(monkeypatch):
@@ -367,14 +471,16 @@ def test_times_of_capture_of_an_ensemble_stand_under_theory(figures):
     found = theory.at_energy(load("moving-cap"), 1e6)
     t_in = np.linspace(1.0, 3.0, 200)
     given = GivenEnsemble(load("moving-cap"), 1e6, np.zeros(201), t_in=np.append(t_in, np.nan))
-    assert audit_ensemble.capture_times(given)
+    assert ensemble_command.capture_times(given)
     [axes] = figures[0].axes
     shown, law = bars(axes, "ensemble"), bars(axes, "theory")
     assert shown.heights == pytest.approx(np.histogram(t_in, shown.edges, density=True)[0])
     assert (shown.edges[0], shown.edges[-1]) == (1.0, 3.0)
+    assert said(figures[0]) == [" | time of capture | density | ensemble | theory"]
+    assert axes.get_ylim()[0] == 0
     assert law.area == pytest.approx(float(np.ptp(found.capture_cdf(np.array([1.0, 3.0])))))
     for nothing in (None, np.full(9, np.nan), np.full(9, 2.0)):
-        assert audit_ensemble.capture_times(given._replace(t_in=nothing)) is None
+        assert ensemble_command.capture_times(given._replace(t_in=nothing)) is None
 
 
 def test_our_solvers_answer_as_one_step_does():
@@ -491,3 +597,16 @@ def test_a_good_run_is_shown_without_objections(capsys, monkeypatch):
     text = shown_on_a_terminal(capsys, monkeypatch, a_run(*GOOD, *many))
     assert "... and 3 more: --json FILE has them all." in text
     assert text.count(": fail: wrong") == 20
+
+
+def test_the_width_of_a_proved_path_is_that_of_its_places_and_velocities():
+    """Places are measured by their distance from the middle, velocities by the speed: the worse counts."""
+    path = reference.trajectory(load("moving-cap"), State(0.2, 0.1, 0.3, 30.0, 5.0), 12, working=30)
+    for point, step in zip(bench._places(path), path.steps, strict=True):
+        _, x, y, vx, vy = step.after
+        size = math.hypot(float(x.centre()), float(y.centre()))
+        speed = math.hypot(float(vx.centre()), float(vy.centre()))
+        units = size, size, speed, speed
+        worst = max(float(c.width()) / unit for c, unit in zip(step.after[1:], units, strict=True))
+        assert float(point.width) == pytest.approx(worst, rel=1e-12)
+        assert (point.wall, point.x, point.vy) == (step.wall, x.centre(), vy.centre())

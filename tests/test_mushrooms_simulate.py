@@ -26,12 +26,12 @@ from support.refusals import assert_refused
 
 import fast
 import theory
-from conformance.audit.runs import SCENES
 from fast.kernel.follow import LANE_ROWS
-from mushrooms import audit_ensemble, output
-from mushrooms.audit_ensemble import Options
+from mushrooms import progress
+from mushrooms.audit import ensemble_command
+from mushrooms.audit.ensemble_command import Reading
+from mushrooms.folders import LOCK, locked
 from mushrooms.main import run
-from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct
 from mushrooms.store.run import DESCRIPTION, GROUP, MARKERS, StoredRun
 from mushrooms.store.spec import RunSpec, shape_of
@@ -44,6 +44,7 @@ from mushrooms.store.summary import (
     measured,
 )
 from scene import Fourier, Mushroom, load
+from scene.named import SCENES
 
 IN_MEMORY = ["simulate", "moving-cap", "--particles", 60, "--energy", 1e4, "--threads", 1, "--json"]
 
@@ -234,13 +235,17 @@ def test_a_block_is_reported_at_once_and_two_are_in_memory(tmp_path, monkeypatch
 
 def test_progress_tells_the_time_left(capsys, monkeypatch):
     """From the first call on: what was there before took no time."""
-    now = iter(range(0, 10**6, 60))
-    monkeypatch.setattr(output, "CLOCK", lambda: float(next(now)))
-    with output.progress_bar() as bar:
-        watch = output.Watch(bar, "run", "particles")
-        for n_done in (500, 1000, 1500):
+    now = iter(range(7000, 10**6, 60))  # a clock begins anywhere
+    monkeypatch.setattr(progress, "CLOCK", lambda: float(next(now)))
+    with progress.progress_bar() as bar:
+        watch = progress.Watch(bar, "run", "particles")
+        for n_done in (500, 1000, 1500, 1900):
             watch.update(n_done, 2000)
-    told = "run: 1,000 of 2,000 particles, 2 minutes left\nrun: 1,500 of 2,000 particles, 60 seconds left\n"
+    told = (
+        "run: 1,000 of 2,000 particles, 2 minutes left\n"
+        "run: 1,500 of 2,000 particles, 60 seconds left\n"
+        "run: 1,900 of 2,000 particles, 13 seconds left\n"
+    )
     assert capsys.readouterr().err == told
 
 
@@ -427,7 +432,7 @@ def test_exports_have_every_bit(command_line, stored, tmp_path):
         for found in (rows, table):
             np.testing.assert_array_equal(np.asarray(found[name]), column)
     for path in (tmp_path / "run.csv", tmp_path / "run.parquet", stored):  # and the audit reads them
-        given, _ = audit_ensemble.read(path, load("moving-cap"), Options(ENERGY, "v2/2", "scene", None))
+        given, _ = ensemble_command.read(path, load("moving-cap"), Reading(ENERGY, "v2/2", "scene", None))
         takes_part = np.isfinite(ensemble.energy)
         np.testing.assert_array_equal(given.s, np.log(ensemble.energy[takes_part] / ENERGY))
         np.testing.assert_array_equal(given.t_in, ensemble.t_in[takes_part, 0, 0])

@@ -20,15 +20,15 @@ from zarr.storage import LocalStore
 
 import fast
 import mushrooms
-from conformance.files import sealed, unsealed
 from fast.kernel import follow as kernel, rows
 from mushrooms import simulate
+from mushrooms.folders import LOCK, locked
 from mushrooms.main import run
-from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct, run as stored
 from mushrooms.store.run import DESCRIPTION, DIGESTED, StoredRun
 from mushrooms.store.spec import LANES, SCHEMA, RunSpec, paused_of, shape_of
 from scene import load, to_data
+from scene.files.writer import sealed, unsealed
 
 pytestmark = pytest.mark.usefixtures("unsynced")
 N, ENERGY, SEED = 330, 40.0, 7

@@ -16,9 +16,9 @@ from scipy.stats import norm
 
 import fast
 import theory
-from conformance.audit.frozen import MEASURED
-from conformance.audit.runs import scene_named
-from conformance.audit.tolerances import Mean, mean, share
+from mushrooms.audit.frozen import MEASURED
+from mushrooms.audit.tolerances import Mean, mean, share
+from scene.named import scene_named
 from theory.finite_energy.one_cycle import FiniteEnergy
 
 LEVEL = 0.01

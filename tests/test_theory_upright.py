@@ -7,8 +7,8 @@ import pytest
 from support.depth import deep_but
 
 import fast
-from conformance.audit.frozen import swaying
-from conformance.audit.tolerances import Mean, mean
+from mushrooms.audit.frozen import swaying
+from mushrooms.audit.tolerances import Mean, mean
 from scene import BangBang, Fourier, Mushroom, State, load
 from scene.transforms import scaled
 from theory import (

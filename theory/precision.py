@@ -21,9 +21,9 @@ from typing import Any, ParamSpec, TypeVar
 
 import gmpy2
 import numpy as np
-from mpmath.libmp import from_man_exp, libelefun
 from numpy.typing import ArrayLike, NDArray
 
+from scene import mpmath_internals as raw
 from scene.refusal import BadInput, check_number, shown
 
 P = ParamSpec("P")
@@ -48,8 +48,7 @@ def guarded(function: Callable[P, R]) -> Callable[P, R]:
 
 def settle(ctx: Any) -> None:
     """Compute the constants to more digits than a context will ask for: nothing refines them later."""
-    for constant in (libelefun.pi_fixed, libelefun.ln2_fixed, libelefun.ln10_fixed):
-        constant(4 * ctx.prec)  # cos and exp work with up to about three times the precision
+    raw.know_constants(4 * ctx.prec)  # cos and exp work with up to about three times the precision
 
 
 class Binary:
@@ -100,13 +99,13 @@ class Binary:
 
     def taken(self, x: Any) -> Any:
         """Return a number of the mpmath context as one of these."""
-        sign, mantissa, exponent, _ = self.ctx.convert(x)._mpf_
-        return self.ldexp(gmpy2.mpfr(-mantissa if sign else mantissa), exponent)
+        mantissa, exponent = raw.parts(raw.number(self.ctx.convert(x)))
+        return self.ldexp(gmpy2.mpfr(mantissa), exponent)
 
     def given(self, x: Any) -> Any:
         """Return one of these as a number of the mpmath context, rounded to it."""
         mantissa, exponent = x.as_mantissa_exp()
-        return self.ctx.make_mpf(from_man_exp(mantissa, int(exponent), *self.ctx._prec_rounding))
+        return self.ctx.mpf((mantissa, int(exponent)))
 
 
 def check_real(**numbers: object) -> None:

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 from conformance import suite
 from conformance.bench.baselines import NAMES
-from conformance.files import write_file
 from conformance.harness.examples import Example, find_examples, find_kit_examples
 from conformance.suite.result import Run
 from conformance.suite.session import Limits
+from scene.files.writer import write_file
 
 PAGE = Path(__file__).parent.parent.parent / "docs" / "scoreboard.md"
 SEED = 1

@@ -18,11 +18,11 @@ from typing import Any
 
 import msgspec
 
-from conformance.files import write_file
 from conformance.grading.agreement import grade
 from conformance.mutants import COMMON, MUTANTS, PLAIN, Mutant
 from conformance.vectors import LEVELS, Vector, answer, load, manifest
 from scene import BadInput
+from scene.files.writer import write_file
 
 DATA = Path(__file__).parent  # the matrix ships with the package
 MOST_VECTORS = 3  # kept of those that kill a mutant

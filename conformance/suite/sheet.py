@@ -13,11 +13,9 @@ Numbers may be decimal, with Fortran's exponent D too, or hexadecimal as C's %a 
 Not in a sheet: how a process behaves, lines that are no questions, checks that go on from an answer, time.
 """
 
-import csv
 import hashlib
 import io
 import itertools
-import math
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,7 +26,6 @@ from typing import Any, NamedTuple
 import msgspec
 
 from conformance import plain, vectors
-from conformance.files import write_files
 from conformance.suite.checks import checks_of, flows, run_check
 from conformance.suite.checks.form import QUESTIONS, SuiteCheck
 from conformance.suite.process import CheckFailure, clean
@@ -45,6 +42,8 @@ from conformance.suite.session import (
     with_walls,
 )
 from conformance.vectors import LEVELS, Vector
+from scene.files.tables import read_number, read_rows
+from scene.files.writer import write_files
 from scene.protocol.messages import PROTOCOL, Echoed, Introduction
 from scene.protocol.wire import serve
 from scene.refusal import BadInput, shown
@@ -77,8 +76,6 @@ STATE = ("t", "x", "y", "vx", "vy")
 COLUMNS = ("seq", "cmd", "collisions", *STATE, "wall", "t_end")  # of questions
 NEEDED = ("seq", "outcome", *STATE)  # of answers
 OPTIONAL = ("wall", "dt", "t_in", "t_out", "reason")
-
-SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 
 
 class SheetQuestion(NamedTuple):
@@ -421,77 +418,6 @@ def _seq(row: tuple[str, dict[str, str]]) -> int:
     return int(number)
 
 
-def read_rows(
-    path: Path, label: str, needed: Sequence[str], known: Sequence[str] | None = None
-) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield the rows of a CSV file by the names of its columns, each with its place; # begins a comment.
-
-    Args:
-        path: of the file.
-        label: what messages begin with.
-        needed: columns that must be there.
-        known: columns that there may be; None for any.
-
-    Raises:
-        BadInput: naming the column, or the place.
-    """
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        reader = csv.reader(file)
-        rows = (row for row in reader if any(map(str.strip, row)) and not row[0].startswith("#"))
-        try:
-            names = _names(next(rows, []), label)
-            lacking = [name for name in needed if name not in names]
-            twice = [name for i, name in enumerate(names) if name in names[:i]]
-            unknown = [name for name in names if known and name not in known]
-            for fault, found in (("is missing", lacking), ("stands twice", twice), ("is unknown", unknown)):
-                if found:
-                    which = f"; columns are {', '.join(known)}" if known else ""
-                    raise BadInput(f"{label}: column {shown(found[0])} {fault}{which}")
-            for row in rows:
-                place = f"{label}:{reader.line_num}"
-                if len(row) != len(names):
-                    raise BadInput(f"{place}: {_miscounted(row, names)}")
-                yield place, dict(zip(names, map(str.strip, row), strict=True))
-        except (csv.Error, UnicodeDecodeError) as error:
-            raise _unreadable(label, reader.line_num, error) from None
-
-
-def read_names(path: Path, label: str) -> list[str]:
-    """Return the names of the columns of a CSV file, from its first line.
-
-    Raises:
-        BadInput: it is no CSV file with commas.
-    """
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        try:
-            return _names(next(csv.reader(file), []), label)
-        except (csv.Error, UnicodeDecodeError) as error:
-            raise _unreadable(label, 1, error) from None
-
-
-def _unreadable(label: str, line: int, error: Exception) -> BadInput:
-    why = "it is no UTF-8" if isinstance(error, UnicodeDecodeError) else error
-    return BadInput(f"{label}:{line}: {why}")
-
-
-def _names(row: Sequence[str], label: str) -> list[str]:
-    """Return the names in a first row; of one that nothing separates refuse another separator by its name."""
-    names = [name.strip() for name in row]
-    if len(names) == 1:
-        for mark, word in SEPARATORS.items():
-            if mark in names[0]:
-                raise BadInput(f"{label}: its columns are separated by {word}, must be by commas")
-    return names
-
-
-def _miscounted(row: Sequence[str], names: Sequence[str]) -> str:
-    """Say that a row has too many or too few cells, and what makes twice as many."""
-    said = f"{len(row)} cells, must be {len(names)} as in the first row"
-    n_whole = sum(cell.strip().lstrip("+-").isdigit() for cell in row)
-    is_decimal_comma = len(row) > len(names) and 2 * n_whole > len(row)
-    return f"{said}; numbers must have a decimal point, no comma" if is_decimal_comma else said
-
-
 def _outcome(place: str, cells: Mapping[str, str]) -> dict[str, Any]:
     """Return a row as an outcome of protocol 1; what it does not hold is left out."""
     words = {name: cells[name] for name in ("wall", "reason") if cells.get(name)}
@@ -501,20 +427,3 @@ def _outcome(place: str, cells: Mapping[str, str]) -> dict[str, Any]:
     is_told = cells["outcome"] == "horizon" and ("t_in" in cells or "t_out" in cells)
     captured = {"captured": ends or None} if is_told else {}
     return {"outcome": cells["outcome"], "reason": "", **words, **numbers, **captured}
-
-
-def read_number(place: str, name: str, text: str) -> float:
-    """Return a number written in decimal, with Fortran's D, or hexadecimal with p.
-
-    Raises:
-        BadInput: it is none, or not finite.
-    """
-    try:
-        word = text.lower()
-        number = float.fromhex(word) if "0x" in word else float(word.replace("d", "e"))
-    except (ValueError, OverflowError):
-        number = math.nan
-    if not math.isfinite(number):
-        how = "with a decimal point" if "," in text else "decimal or as 0x1.8p+3"
-        raise BadInput(f"{place}: {name} = {shown(text)}, must be a finite number, {how}")
-    return number

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import config, types
-from numba.extending import intrinsic
 
 from fast.kernel.compiling import kept, kernel, packed, part
+from fast.kernel.numba_internals import intrinsic
 from scene.precision import decimals
 
 SAFETY = 8.0 * 2.0**-53  # eight units in the last place of the summed sizes of a sum's terms

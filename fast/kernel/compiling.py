@@ -14,23 +14,22 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import llvmlite
 import numba
-from llvmlite import ir
-from llvmlite.binding import get_host_cpu_name
-from numba import config, njit, types
-from numba.core import cgutils
-from numba.core.codegen import get_host_cpu_features
-from numba.core.typing import Signature
-from numba.extending import intrinsic, register_jitable
+from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
+from numba import config, njit
+from numba.extending import register_jitable
 
+from fast.kernel import numba_internals
+from fast.kernel.numba_internals import UNCOUNTED, UNWRAPPED, cache_folder, is_compiled, is_newly_compiled
+
+F = TypeVar("F", bound=Callable[..., Any])
 SEAL = hashlib.sha256().digest_size  # bytes, at the end of an index file
 # No fastmath, so that results are the same bits on every machine; quotients by zero are infinite or nan, as
-# in numpy. The caller of a kernel holds its arrays while it runs, hence no references are counted in it: each
-# count is an atomic operation, and much to compile. So a kernel cannot allocate.
-HOW: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
+# in numpy.
+HOW: dict[str, Any] = {"error_model": "numpy", **UNWRAPPED, **UNCOUNTED}
 
 
 def digest_of_sources(folder: Path) -> str:
@@ -41,14 +40,23 @@ def digest_of_sources(folder: Path) -> str:
     return digest.hexdigest()
 
 
+def _host_features() -> str:
+    try:
+        features: str = get_host_cpu_features().flatten()
+    except RuntimeError:  # LLVM does not know this processor; numba then asks for no features
+        return ""
+    return features
+
+
 SOURCES = digest_of_sources(Path(__file__).parent.parent)
 # What makes machine code of them, and for which processor; numba's switches say otherwise where they are set.
 TOOLS = (
     numba.__version__,
     llvmlite.__version__,
     get_host_cpu_name() if config.CPU_NAME is None else config.CPU_NAME,
-    get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES,
+    _host_features() if config.CPU_FEATURES is None else config.CPU_FEATURES,
     sys.implementation.cache_tag,
+    config.ENABLE_AVX,
 )
 
 
@@ -80,7 +88,7 @@ def kept(*variant: object, **options: Any) -> Callable[[Any], Any]:
         except RuntimeError:  # numba finds no folder that can be written in
             return njit(**options)(function)
         if not config.DISABLE_JIT:
-            entry.compile = partial(_load_or_compile, entry, entry.compile)
+            numba_internals.compile_with(entry, partial(_load_or_compile, entry, entry.compile))
         return entry
 
     return compiled
@@ -88,7 +96,7 @@ def kept(*variant: object, **options: Any) -> Callable[[Any], Any]:
 
 def _load_or_compile(entry: Any, compile_or_load: Callable[[Any], Any], signature: Any) -> Any:
     """Let numba load an entry if its files are as they were written, else compile it, and seal the files."""
-    if signature in entry.overloads:
+    if is_compiled(entry, signature):
         return compile_or_load(signature)
     files = _files_of(entry)
     if files and not _is_sealed(files):
@@ -98,7 +106,7 @@ def _load_or_compile(entry: Any, compile_or_load: Callable[[Any], Any], signatur
         found = compile_or_load(signature)
     except OSError:  # it is compiled before it is written, and numba has it still
         found = compile_or_load(signature)
-    if signature in entry.stats.cache_misses:
+    if is_newly_compiled(entry, signature):
         with suppress(OSError):
             files = _files_of(entry)
             for index in (path for path in files if path.suffix == ".nbi"):
@@ -112,7 +120,8 @@ def _load_or_compile(entry: Any, compile_or_load: Callable[[Any], Any], signatur
 def _files_of(entry: Any) -> list[Path]:
     """Return the files that an entry is kept in, the index last."""
     name = entry.py_func.__qualname__.split(">.")[-1]  # of one in a function numba drops the brackets
-    return sorted(Path(entry.stats.cache_path).glob(f"*.{name}-*.nb[ic]"))
+    folder = cache_folder(entry)
+    return [] if folder is None else sorted(folder.glob(f"*.{name}-*.nb[ic]"))
 
 
 def _is_sealed(files: list[Path]) -> bool:
@@ -137,46 +146,18 @@ def _called(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
     return function(*arguments)
 
 
-def caller(signature: Signature) -> Callable[..., Any]:
+def caller(signature: Any) -> Callable[..., Any]:
     """Return a function for kernels that calls what lies at an address with a tuple of arguments."""
-    if config.DISABLE_JIT:
-        return _called
-
-    @intrinsic
-    def call(_context: Any, _address: Any, _arguments: Any) -> Any:
-        def generate(context: Any, builder: ir.IRBuilder, _: Any, given: Any) -> Any:
-            result, parameters = signature.return_type, signature.args
-            convention = context.call_conv
-            kind = convention.get_function_type(result, parameters)
-            function = builder.inttoptr(given[0], ir.PointerType(kind))
-            arguments = cgutils.unpack_tuple(builder, given[1])
-            _, found = convention.call_function(builder, function, result, parameters, arguments)
-            return found
-
-        return signature.return_type(types.int64, types.Tuple(signature.args)), generate
-
-    return call  # type: ignore[no-any-return]
+    return _called if config.DISABLE_JIT else numba_internals.caller_by_address(signature)
 
 
 # A function of its own, compiled where compiled functions call it. Python, which calls the function as it is
 # written, has nothing compiled for it.
-kernel = register_jitable(**HOW)
+kernel: Callable[[F], F] = register_jitable(**HOW)
 # The same, which LLVM always inlines: a loop over lanes with a call in it is not packed.
-packed = register_jitable(forceinline=True, **HOW)
+packed: Callable[[F], F] = register_jitable(forceinline=True, **HOW)
 # A function whose text is put into its callers before types are inferred.
-part = njit(**HOW, inline="always")
-
-
-@intrinsic
-def _compiled_widest_registers(_context: Any) -> Any:
-    def generate(context: Any, builder: ir.IRBuilder, _: Any, __: Any) -> Any:
-        # llvmlite's own `add` knows none of the attributes that are strings.
-        set.add(builder.function.attributes, '"prefer-vector-width"="512"')
-        # Registers that are put aside cross no cache line then, wherever the caller's stack ends.
-        builder.function.attributes.alignstack = 64
-        return context.get_dummy_value()
-
-    return types.none(), generate
+part: Callable[[F], F] = njit(**HOW, inline="always")
 
 
 def _no_registers() -> None:
@@ -186,4 +167,4 @@ def _no_registers() -> None:
 # Asks, in the function that calls it, for the widest registers there are: left to itself the compiler takes
 # 256 bits on machines that have 512. The answers are the same bits. A loop is packed by itself and again
 # where it is inlined, which keeps only the outer function's attributes: both ask.
-widest_registers = _no_registers if config.DISABLE_JIT else _compiled_widest_registers
+widest_registers = _no_registers if config.DISABLE_JIT else numba_internals.widest_registers

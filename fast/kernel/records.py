@@ -48,6 +48,7 @@ CAP, STEM, MUSHROOM = np.arange(3)
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+Integer = int | np.integer[Any]  # of Python or of numpy
 
 # Rows of `laws`, `bounds` and `anchors`. WIDTH is the half-width w of the stem, or nu where a scene gives it.
 # SHARED, a row of `laws` alone, holds OMEGA, N_HARMONICS and OMEGA_LOW of all Fourier laws of a scene.
@@ -212,7 +213,7 @@ class Particle(NamedTuple):
     y: float
     vx: float
     vy: float
-    wall: int | np.integer[Any]
+    wall: Integer
 
 
 class Place(NamedTuple):
@@ -301,25 +302,25 @@ def unfilled_ends(
 
 
 @kernel
-def is_hit(code):
+def is_hit(code: Integer) -> bool | np.bool:
     """Tell whether a step's code is that of a wall that is met, or NO_WALL."""
     return code < HORIZON
 
 
 @kernel
-def is_lost(code):
+def is_lost(code: Integer) -> bool | np.bool:
     """Tell whether a step's code is that of a particle that neither meets a wall nor reaches the horizon."""
     return code > HORIZON
 
 
 @kernel
-def particle_at(states, i, wall):
+def particle_at(states: FloatArray, i: int, wall: Integer) -> Particle:
     """Return the particle whose state is a row of `states`."""
     return Particle(states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4], states[i, 5], wall)
 
 
 @kernel
-def write_state(states, i, particle):
+def write_state(states: FloatArray, i: int, particle: Particle) -> None:
     """Write a particle's state into a row of `states`."""
     states[i, 0], states[i, 1] = particle.t, particle.t_low
     states[i, 2], states[i, 3] = particle.x, particle.y
@@ -327,7 +328,7 @@ def write_state(states, i, particle):
 
 
 @kernel
-def write_step(steps, i, factors, dt, particle):
+def write_step(steps: FloatArray, i: int, factors: FloatArray, dt: float, particle: Particle) -> bool:
     """Write row i of steps, dt, t, x, y, vx, vy after a collision; returns whether no number lost a bit.
 
     They are multiplied by `factors` (4, 6), two powers of two, which come with their inverses: one alone may
@@ -344,6 +345,6 @@ def write_step(steps, i, factors, dt, particle):
 
 
 @kernel
-def released(particle):
+def released(particle: Particle) -> Particle:
     """Return the particle as one that is on no wall."""
     return Particle(particle.t, particle.t_low, particle.x, particle.y, particle.vx, particle.vy, NO_WALL)

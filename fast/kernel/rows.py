@@ -7,7 +7,7 @@ and taken out of it goes through the functions below.
 import numpy as np
 
 from fast.kernel.compiling import kernel, part
-from fast.kernel.records import ARC, BASE, FLOOR, LEFT, RIGHT, Particle
+from fast.kernel.records import ARC, BASE, FLOOR, LEFT, RIGHT, FloatArray, Integer, Particle
 
 # A pool holds particles side by side, one in each lane.
 LANES = 128
@@ -57,7 +57,7 @@ REGISTER = np.int64(8)  # lanes of the widest registers
 
 
 @part
-def whole_registers(n):
+def whole_registers(n: Integer) -> Integer:
     """Return the number of lanes rounded up to whole registers: what they hold too many is not looked at.
 
     One lane alone is left alone: what is done for it is then not packed, and roots and quotients come sooner.
@@ -66,7 +66,7 @@ def whole_registers(n):
 
 
 @part
-def load(a, i, particle, is_first_kept):
+def load(a: FloatArray, i: np.int64, particle: Particle, is_first_kept: bool) -> None:
     """Put a particle into a lane; its laws are unknown there, so its first step will be careful."""
     for row in range(N_ROWS):
         a[row * STRIDE + i] = 0.0
@@ -81,26 +81,26 @@ def load(a, i, particle, is_first_kept):
 
 
 @part
-def particle_of(a, i):
+def particle_of(a: FloatArray, i: np.int64) -> Particle:
     """Return a lane's particle."""
     return Particle(a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i], int(a[WALL + i]))
 
 
 @part
-def put_particle(a, i, p):
+def put_particle(a: FloatArray, i: np.int64, p: Particle) -> None:
     """Write a particle's state into a lane, but for its wall."""
     a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i] = p.t, p.t_low, p.x, p.y, p.vx, p.vy
 
 
 @kernel
-def copy_rows(a, i, b, j, first, last):
+def copy_rows(a: FloatArray, i: Integer, b: FloatArray, j: Integer, first: Integer, last: Integer) -> None:
     """Copy what lane i of one pool holds to lane j of another, from one row up to another."""
     for row in range(first, last, STRIDE):
         b[row + j] = a[row + i]
 
 
 @part
-def refold(a, i):
+def refold(a: FloatArray, i: np.int64) -> None:
     """Bring an unfolded particle back to y >= 0; its wall is known since it first hit the arc.
 
     One that is below y = 0 as it leaves the base was given so, within what a start may be off its wall.

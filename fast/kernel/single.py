@@ -7,19 +7,21 @@ refused here is refused by the checks in Python too, which say why.
 
 import math
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numba import config, types
 
 from fast.kernel.compiling import kept, kernel, part
+from fast.kernel.numba_internals import function_of
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, ANSWER_LOST, BAD_QUESTION, HORIZON, OFF_WALL, SHARED, Compiled, Particle,
-    is_lost,
+    ANCHORS_SHAPE, ANSWER_LOST, BAD_QUESTION, HORIZON, OFF_WALL, SHARED, Compiled, FloatArray,
+    Integer, Particle, is_lost,
 )  # fmt: skip
 from fast.kernel.scalar_step import GIVEN
 from fast.kernel.worker import run_careful
-from scene.transforms import times_power
+from scene.laws import times_power
 
 # Squares of what is larger overflow.
 LARGEST = 2.0**400
@@ -31,18 +33,17 @@ LARGEST_FLOAT = float(np.finfo(np.float64).max)
 ldexp = times_power if config.DISABLE_JIT else math.ldexp
 
 
-def pack_scene(scene, length, time):
+def pack_scene(scene: Compiled, length: int, time: int | None) -> FloatArray:
     """Return a Compiled and its units as one array of floats; see fast.units.
 
     Every argument more costs a call some twentieth of a microsecond.
     """
-    time = math.nan if time is None else time
-    first = [scene.table, scene.is_relative, length, time]
+    first = [scene.table, scene.is_relative, length, math.nan if time is None else time]
     return np.concatenate([first, scene.bounds.ravel(), scene.laws.ravel()])
 
 
 @part
-def unpack_scene(numbers):
+def unpack_scene(numbers: FloatArray) -> Compiled:
     """Return the Compiled that `packed` was given."""
     bounds, laws = numbers[4:20].reshape((4, 4)), numbers[20:]
     return Compiled(
@@ -51,13 +52,13 @@ def unpack_scene(numbers):
 
 
 @kernel
-def static_time(length, speed):
+def static_time(length: int, speed: float) -> int:
     """Return the exponent of a static table's unit of time, for a state of this speed; see fast.units."""
     return length + LENGTH - TIME - (math.frexp(speed)[1] - 1) if speed > 0.0 else 0
 
 
 @kernel
-def scaled(number, exponent):
+def scaled(number: float, exponent: int) -> tuple[float, bool]:
     """Return a number times 2^exponent, and whether that is finite and exact."""
     if -1000 <= exponent <= 1000:  # a product is exact as well, and quicker
         found = float(number) * ldexp(1.0, exponent)
@@ -67,7 +68,7 @@ def scaled(number, exponent):
 
 
 @kernel
-def rescaled(particle, length, time):
+def rescaled(particle: Particle, length: int, time: int) -> tuple[Particle, bool]:
     """Return a particle times 2^length and 2^time, and whether all its numbers are finite and exact then."""
     speed = length - time
     t, is_t_kept = scaled(particle.t, time)
@@ -80,7 +81,7 @@ def rescaled(particle, length, time):
 
 
 @kernel
-def question(given, t_end, length, time):
+def question(given: Particle, t_end: float, length: int, time: int) -> tuple[bool, Particle, float]:
     """Return whether a state and a horizon can be taken, and both in the kernel's units; see fast.units."""
     particle, is_kept = rescaled(given, -length, -time)
     end, is_end_kept = scaled(t_end, -time)
@@ -93,7 +94,17 @@ def question(given, t_end, length, time):
 
 
 @kept(error_model="numpy")
-def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
+def single(
+    step_at: Any,
+    numbers: FloatArray,
+    t: float,
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    wall: Integer,
+    t_end: float,
+) -> tuple[Integer, float, float, float, float, float, float]:
     """Take a scalar step, whose address is given, in a packed scene.
 
     Returns:
@@ -119,7 +130,7 @@ def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
 
 
 @kept(error_model="numpy")
-def off_wall(step_at, scene, particle):
+def off_wall(step_at: Any, scene: Compiled, particle: Particle) -> float:
     """Return the share of its wall's size by which a particle is off it; 0 for one on it.
 
     And for one at a time whose phase is lost: that is left to the step, which refuses it.
@@ -133,7 +144,7 @@ SINGLE = (WHOLE, NUMBERS, REAL, REAL, REAL, REAL, REAL, WHOLE, REAL)
 
 
 @cache
-def single_at_once():
+def single_at_once() -> Any:
     """Return `single` for arguments that are known to be of the right types: they are not looked at again.
 
     To find out what each of nine arguments is takes numba a tenth of the time of a whole question.
@@ -141,4 +152,4 @@ def single_at_once():
     if config.DISABLE_JIT:
         return single
     single.compile(SINGLE)
-    return single.overloads[SINGLE].entry_point
+    return function_of(single, SINGLE)

@@ -12,7 +12,7 @@ take minutes. So the main thread, where signals are handled, only waits for thos
 off what they do.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from functools import cache
@@ -20,16 +20,16 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numba import config, typeof, types
-from numba.core.typing import Signature, signature as returns
 
 from fast.kernel import rows
 from fast.kernel.compiling import HOW, caller, kept, widest_registers
 from fast.kernel.lane_laws import DEGREES, NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
+from fast.kernel.numba_internals import address_of, returned_type
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawLimits, LawsInLanes, Particle,
-    Stops,
+    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LaneWaves, LawLimits, LawsInLanes,
+    Particle, Stops,
 )  # fmt: skip
 
 from fast.kernel.scalar_step import scalar_step
@@ -38,9 +38,9 @@ from fast.kernel.scalar_step import scalar_step
 _PARTICLE, _TABLE = Particle(*(0.0,) * 6, 0), np.zeros((1, 1))
 _SCENE = Compiled(0, False, _TABLE, _TABLE)
 _LOOP_TAKES = (np.zeros(1), 0, _SCENE, NO_WAVES, 0.0, LawLimits(*(0.0,) * 8))
-STEP = returns(types.none, *map(typeof, _LOOP_TAKES))
+STEP = types.none(*map(typeof, _LOOP_TAKES))
 _STEP_TAKES = (_PARTICLE, 0.0, 0, _SCENE, _TABLE)
-CAREFUL = returns(typeof((0, 0.0, _PARTICLE)), *map(typeof, _STEP_TAKES))
+CAREFUL = typeof((0, 0.0, _PARTICLE))(*map(typeof, _STEP_TAKES))
 
 run_step, run_careful = caller(STEP), caller(CAREFUL)
 
@@ -59,11 +59,14 @@ class Loops(NamedTuple):
     chord: int
 
 
-def _loop(step, is_slope_moving, form):
-    terms, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
+def _loop(step: Callable[..., None], is_slope_moving: bool, form: int) -> Any:
+    terms = (0,) * form
+    is_waves = form in (ONE_WAVE, TWO_WAVES)
 
     @kept(step.__name__, is_slope_moving, form, **HOW)
-    def loop(a, n, scene, waves, slope, limits):
+    def loop(
+        a: FloatArray, n: int, scene: Compiled, waves: LaneWaves, slope: float, limits: LawLimits
+    ) -> None:
         """Take a step of each lane: see fast.kernel.lanes."""
         widest_registers()
         step(a, n, scene, waves if is_waves else None, None if is_slope_moving else slope, terms, limits)
@@ -77,7 +80,7 @@ FLIES = {(moves, form): _loop(fly, moves, form) for moves in (False, True) for f
 CHORDS = {form: _loop(chord, False, form) for form in FORMS}
 
 
-def address(entry: Any, signature: Signature) -> Any:
+def address(entry: Any, signature: Any) -> Any:
     """Compile an entry, or load it from the disk cache, and return its address.
 
     Raises:
@@ -86,10 +89,10 @@ def address(entry: Any, signature: Signature) -> Any:
     if config.DISABLE_JIT:
         return entry
     entry.compile(signature.args)
-    found = entry.overloads[signature.args]
-    if found.signature.return_type != signature.return_type:
-        raise TypeError(f"{entry.py_func.__name__} returns {found.signature.return_type}")
-    return found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+    found = returned_type(entry, signature.args)
+    if found != signature.return_type:
+        raise TypeError(f"{entry.py_func.__name__} returns {found}")
+    return address_of(entry, signature.args)
 
 
 @cache

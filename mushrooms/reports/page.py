@@ -1,11 +1,11 @@
-"""What the HTML reports share: one template, one style, embedded figures, numbers, and typeset formulas.
+"""What the HTML reports share: template, style, embedded figures, numbers, typeset formulas.
 
-A page is one file: no scripts, and nothing is loaded from elsewhere. Claims are written as plain text. What
-looks like a formula there becomes italic letters, sub- and superscripts and proper signs.
+A page is one file: no scripts, and nothing is loaded from elsewhere. Claims are written as plain
+text. What looks like a formula there becomes italic letters, sub- and superscripts and proper
+signs.
 """
 
 import json
-import math
 import re
 from typing import Any
 from urllib.parse import quote
@@ -13,7 +13,6 @@ from urllib.parse import quote
 import jinja2
 from markupsafe import Markup, escape
 
-from conformance.audit.claim import Check
 from mushrooms import __version__
 
 
@@ -35,19 +34,11 @@ def number(value: float | None, form: str) -> str:
     return "–" if value is None else format(value, form)
 
 
-def pull(check: Check) -> float | None:
-    """Return how many standard errors a value is from the number expected; None where nothing is random."""
-    if check.value is None or not check.error:
-        return None
-    try:
-        found = (check.value - float(check.expected)) / check.error
-    except ValueError:  # it is held against a bound
-        return None
-    return found if math.isfinite(found) and math.isfinite(check.error) else None
-
-
 def as_json(value: Any) -> str:
-    """Return data as readers see it: jinja's own filter is for scripts and spells apostrophes by number."""
+    """Return data as readers see it.
+
+    Jinja's own filter is for scripts and spells apostrophes by number.
+    """
     return json.dumps(value, ensure_ascii=False)
 
 
@@ -58,17 +49,20 @@ def embed(svg: bytes) -> str:
 
 SIGNS = {"<=": "≤", ">=": "≥", "+-": "±", "!=": "≠", "->": "→"}
 GREEK = {
-    "alpha": "α", "beta": "β", "delta": "δ", "theta": "θ", "lambda": "λ", "mu": "μ", "nu": "ν", "omega": "ω",
-    "phi": "φ", "sigma": "σ", "tau": "τ",
+    "alpha": "α", "beta": "β", "delta": "δ", "theta": "θ", "lambda": "λ", "mu": "μ", "nu": "ν",
+    "omega": "ω", "phi": "φ", "sigma": "σ", "tau": "τ",
 }  # fmt: skip
-# A symbol with an index (V_cap, sigma_w, m1, E0), or a Greek letter alone; neither is part of a word or of a
-# path, and capitals that name claims (M1, X2) are no symbols.
+# A symbol with an index (V_cap, sigma_w, m1, E0), or a Greek letter alone; neither is part of a
+# word or of a path, and capitals that name claims (M1, X2) are no symbols.
 _LETTERS = "|".join(GREEK)
 _SYMBOL = re.compile(
-    rf"(?<![\w.-])(?:(?P<base>[a-zEVTRJ]|dV|{_LETTERS})(?:_(?P<index>[A-Za-z0-9]{{1,4}})|(?P<digit>[01]))"
+    rf"(?<![\w.-])(?:(?P<base>[a-zEVTRJ]|dV|{_LETTERS})"
+    r"(?:_(?P<index>[A-Za-z0-9]{1,4})|(?P<digit>[01]))"
     rf"|(?P<greek>{_LETTERS}))(?!\w|[\w/]*\.\w)"
 )
-_POWER = re.compile(r"(?<=[\w)²])\^(?:\((?P<long>[^()]{1,12})\)|(?P<short>-?[\d.]+(?:/\d+)?|[a-z]))")
+_POWER = re.compile(
+    r"(?<=[\w)²])\^(?:\((?P<long>[^()]{1,12})\)|(?P<short>-?[\d.]+(?:/\d+)?|[a-z]))"
+)
 
 
 def typeset(text: str) -> Markup:
@@ -85,5 +79,6 @@ def typeset(text: str) -> Markup:
 def _symbol(match: re.Match[str]) -> str:
     if match["greek"]:
         return f"<i>{GREEK[match['greek']]}</i>"
-    base, index = GREEK.get(match["base"], match["base"]), match["index"] or match["digit"]
+    base = GREEK.get(match["base"], match["base"])
+    index = match["index"] or match["digit"]
     return f"<i>{base}</i><sub>{index}</sub>"

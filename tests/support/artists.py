@@ -1,5 +1,6 @@
 """What a matplotlib figure shows, as numbers: lines, measured points with their errors, bars, words."""
 
+import re
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -77,3 +78,20 @@ def labels(axes: Axes) -> list[str]:
 def words(figure: Figure) -> str:
     """Return every text of a figure."""
     return "\n".join(text.get_text() for text in figure.findobj(Text))
+
+
+def said(figure: Figure) -> list[str]:
+    """Return what each panel says: title, names of its axes, legend; and what the figure's legend says.
+
+    A number of two digits or more, and one with decimals, is written #.
+    """
+    found = [
+        [axes.get_title(), axes.get_xlabel(), axes.get_ylabel(), *_entries([axes.get_legend()])]
+        for axes in figure.axes
+    ]
+    found += [_entries([legend]) for legend in figure.legends]
+    return [re.sub(r"\d+(,\d{3})+|\d*\.\d+|\d{2,}", "#", " | ".join(part)) for part in found]
+
+
+def _entries(legends: list[Any]) -> list[str]:
+    return [text.get_text() for legend in legends if legend is not None for text in legend.get_texts()]

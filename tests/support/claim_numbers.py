@@ -1,6 +1,6 @@
 """What the comparisons of the audit's claims must compare, by their words: from samples and theory alone.
 
-Each figure is written down here a second time, with numpy, so that a slip in `conformance/audit/claims` is a
+Each figure is written down here a second time, with numpy, so that a slip in `mushrooms/audit/claims` is a
 difference. The bands are those that the claims state: errors of the theory of finite energy, and what is seen
 late.
 """
@@ -14,9 +14,9 @@ import numpy as np
 from mpmath import fp
 
 import theory
-from conformance.audit.claims.finite_energy import DRAWN_SEED, summed
-from conformance.audit.runs import RUNS, Sample, scene_of
-from conformance.audit.tolerances import N_SIGMA
+from mushrooms.audit.claims.finite_energy import DRAWN_SEED, summed
+from mushrooms.audit.runs import RUNS, Sample, scene_of
+from mushrooms.audit.tolerances import N_SIGMA
 from scene import load
 from scene.laws import bounds, value
 from scene.tables import laws

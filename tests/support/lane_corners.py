@@ -11,7 +11,7 @@ from mpmath import fp
 
 from fast.kernel import records
 from fast.kernel.records import FloatArray
-from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
+from scene import BangBang, Cap, Fourier, GivenLaw, Mushroom, Scene
 from scene.laws import value
 from support.lane_anywhere import Start
 
@@ -61,7 +61,7 @@ def at_the_end_of_a_chord(n: int, random: np.random.Generator) -> tuple[Scene, l
     return Cap(r=r), _along_the_arc(r, n, random, -13)
 
 
-def _along_the_arc(r: Law, n: int, random: np.random.Generator, farthest: float) -> list[Start]:
+def _along_the_arc(r: GivenLaw, n: int, random: np.random.Generator, farthest: float) -> list[Start]:
     starts = []
     for t, s in _times(n, random):
         angle = min(10.0 ** random.uniform(-2.5, 0.4), 2.9)
@@ -96,7 +96,7 @@ CORNERS = {
 }
 
 
-def _moving(mean: float, random: np.random.Generator) -> Law:
+def _moving(mean: float, random: np.random.Generator) -> GivenLaw:
     swing = mean * float(random.choice([0.04, 0.3]))
     if random.random() < 0.5:
         return Fourier(mean, 1.0, (swing,), (0.2 * swing,))
@@ -112,7 +112,7 @@ def _offset(random: np.random.Generator, farthest: float = -8) -> float:
     return float(random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(farthest - 8, farthest))
 
 
-def _at(law: Law, t: float) -> float:
+def _at(law: GivenLaw, t: float) -> float:
     return float(value(fp, law, float(t)))
 
 

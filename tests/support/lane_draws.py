@@ -14,7 +14,7 @@ from mpmath import fp
 
 from fast.kernel import records
 from fast.kernel.records import FloatArray
-from scene import BangBang, Fourier, Law, Mushroom, Wall
+from scene import BangBang, Fourier, GivenLaw, Mushroom, Wall
 from scene.geometry import TableAt, half_width, table_at
 from scene.laws import is_constant, values
 from scene.tables import laws
@@ -66,7 +66,7 @@ def draw_scene(aim: Aim, random: np.random.Generator) -> Mushroom:
     return Mushroom(r=moving, w=share * (1.0 - swing), h=depth)
 
 
-def _moving(swing: float, random: np.random.Generator) -> Law:
+def _moving(swing: float, random: np.random.Generator) -> GivenLaw:
     """Draw a law about 1 that comes down to 1 - swing."""
     if random.random() < 0.75:
         return Fourier(1.0, 1.0, (swing,))
@@ -156,7 +156,12 @@ def pace_of_arc(scene: Mushroom, t: FloatArray) -> FloatArray:
 
 
 def slipping(
-    law: Law, t: FloatArray, s: FloatArray, widest: FloatArray, sign: FloatArray, random: np.random.Generator
+    law: GivenLaw,
+    t: FloatArray,
+    s: FloatArray,
+    widest: FloatArray,
+    sign: FloatArray,
+    random: np.random.Generator,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return starts on the arc from which it comes and goes within s, and the particle is at y = 0 then.
 

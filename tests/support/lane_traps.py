@@ -24,7 +24,7 @@ from mpmath import fp
 
 from fast.kernel import records
 from fast.kernel.records import FloatArray
-from scene import BangBang, Fourier, Law, Mushroom, Scene
+from scene import BangBang, Fourier, GivenLaw, Mushroom, Scene
 from scene.laws import value
 from support.lane_anywhere import Group, Start
 
@@ -147,7 +147,7 @@ def early_hop(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
     return Mushroom(r=r, w=1e-3, h=0.1), [_start(r, random) for _ in range(n)]
 
 
-def _radius(random: np.random.Generator) -> Law:
+def _radius(random: np.random.Generator) -> GivenLaw:
     swing = float(10.0 ** random.uniform(-2, -0.1))
     if random.random() < 0.3:
         inner = float(random.uniform(0.2, 0.8))
@@ -157,7 +157,7 @@ def _radius(random: np.random.Generator) -> Law:
     return Fourier(1.0, 1.0, cos, sin)
 
 
-def _start(r: Law, random: np.random.Generator) -> Start:
+def _start(r: GivenLaw, random: np.random.Generator) -> Start:
     t = 0.0 if random.random() < 0.3 else float(10.0 ** random.uniform(-12, 0))
     now, rate = float(value(fp, r, t)), float(value(fp, r, t, 1))
     off = 0.0 if random.random() < 0.3 else float(10.0 ** random.uniform(-12, 0))

@@ -2,7 +2,7 @@
 
 For each of PHASES of a cycle the file holds, in the scene's own units, how fast kicks of the walls diffuse,
 and, at each of SPEEDS, how far particles near capture lag behind the rest and how much diffusion loses where
-the mouth moves; all with standard errors. `python -m conformance.audit.frozen` measures them on tables at
+the mouth moves; all with standard errors. `python -m mushrooms.audit.frozen` measures them on tables at
 rest. They are even (diffusion, depletion, squares) or odd (lags) in the walls' velocities, so they serve the
 reversed cycle too. theory/equations.md derives what is done with them.
 

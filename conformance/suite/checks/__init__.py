@@ -10,7 +10,7 @@ from functools import partial
 
 from conformance import properties
 from conformance.cases.draw import Draw
-from conformance.suite.checks import flows, paths, requests, timing
+from conformance.suite.checks import bad_input, flows, path_judge, paths, spelling, timing
 from conformance.suite.checks.form import QUESTIONS, Implementation, Question, SuiteCheck, run_check
 from conformance.suite.session import AnswerLine, Session
 from scene import Scene, State, transforms
@@ -32,7 +32,7 @@ def moments(draw: Draw, profile: str, *, is_idle: bool = False) -> Iterator[Ques
     for _ in range(N_SYMMETRIES):
         scene, state = paths.draw_start(draw)
         scene = transforms.idle(transforms.frozen(scene, state.t)) if is_idle else scene
-        span = paths.crossing(scene, state)
+        span = path_judge.crossing(scene, state)
         yield scene, state, state.t + span * (draw.between(0.25, 2.0) if profile == "flow" else 16.0)
 
 
@@ -55,22 +55,22 @@ def _symmetry(name: str) -> SuiteCheck:
 
 SYMMETRIES = tuple(_symmetry(name) for name in properties.PROPERTIES)
 RULES = (
-    SuiteCheck("promise/hits", paths.usual, paths.follow),
-    SuiteCheck("promise/edges", paths.edges, paths.follow),
-    SuiteCheck("promise/changed-questions", paths.changed, paths.follow),
-    SuiteCheck("promise/long-paths", paths.long, paths.follow),
-    SuiteCheck("promise/late-starts", paths.late, paths.follow),
-    SuiteCheck("promise/waiting", paths.waiting, paths.follow),
+    SuiteCheck("promise/hits", paths.usual, path_judge.follow),
+    SuiteCheck("promise/edges", paths.edges, path_judge.follow),
+    SuiteCheck("promise/changed-questions", paths.changed, path_judge.follow),
+    SuiteCheck("promise/long-paths", paths.long, path_judge.follow),
+    SuiteCheck("promise/late-starts", paths.late, path_judge.follow),
+    SuiteCheck("promise/waiting", paths.waiting, path_judge.follow),
     SuiteCheck("promise/long-flow", flows.returning, flows.arrive, ("flow",)),
     SuiteCheck("promise/many-particles", flows.crowds, flows.together, ("flow",)),
     SuiteCheck("promise/endings", flows.endings, flows.end_as_due),
-    SuiteCheck("promise/spelling", requests.spellings, requests.same),
-    SuiteCheck("promise/minus-zero", requests.zeros, requests.same),
-    SuiteCheck("promise/malformed-lines", requests.bad_lines, requests.passed_over),
-    SuiteCheck("promise/extra-fields", requests.further_fields, requests.ignored_or_refused),
-    SuiteCheck("promise/bad-requests", requests.bad_requests, requests.refuse, PROFILES),
-    SuiteCheck("promise/bad-states", requests.bad_states, requests.refuse),
-    SuiteCheck("promise/bad-scenes", requests.bad_scenes, requests.refuse),
+    SuiteCheck("promise/spelling", spelling.spellings, spelling.same),
+    SuiteCheck("promise/minus-zero", spelling.zeros, spelling.same),
+    SuiteCheck("promise/malformed-lines", spelling.bad_lines, spelling.passed_over),
+    SuiteCheck("promise/extra-fields", spelling.further_fields, spelling.ignored_or_refused),
+    SuiteCheck("promise/bad-requests", bad_input.bad_requests, bad_input.refuse, PROFILES),
+    SuiteCheck("promise/bad-states", bad_input.bad_states, bad_input.refuse),
+    SuiteCheck("promise/bad-scenes", bad_input.bad_scenes, bad_input.refuse),
     SuiteCheck("promise/time-steps", timing.questions, timing.same_steps, ("time",)),
     SuiteCheck("promise/time-clock", timing.questions, timing.honest_clock, ("time",)),
 )

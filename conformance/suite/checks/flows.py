@@ -22,6 +22,7 @@ import theory
 from conformance import plain, profiles, properties
 from conformance.cases.draw import Draw
 from conformance.profiles import Statistic
+from conformance.suite.checks.bad_input import INSIDE, RESTING, move_inwards
 from conformance.suite.checks.form import (
     FOREVER,
     PROMPT,
@@ -31,16 +32,8 @@ from conformance.suite.checks.form import (
     octaves,
     rising,
 )
-from conformance.suite.checks.paths import (
-    CARRIED,
-    MAX_HITS,
-    answered_distance,
-    crossing,
-    distance,
-    draw_start,
-    nearly_captured,
-)
-from conformance.suite.checks.requests import INSIDE, RESTING, move_inwards
+from conformance.suite.checks.path_judge import CARRIED, answered_distance, crossing, distance
+from conformance.suite.checks.paths import MAX_HITS, draw_start, nearly_captured
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import read_outcome
 from conformance.vectors import question

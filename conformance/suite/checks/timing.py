@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from conformance.cases.draw import Draw
 from conformance.suite.checks.form import Implementation, Question
-from conformance.suite.checks.paths import distance
+from conformance.suite.checks.path_judge import distance
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Session, read_outcome
 from conformance.vectors import question

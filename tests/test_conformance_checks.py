@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from mpmath import fp
 from support.faulty_steppers import faulty
 
 from conformance.cases.draw import Draw
@@ -29,7 +30,7 @@ from conformance.suite.result import graded_parts
 from conformance.suite.session import Session
 from conformance.vectors import Vector, question
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, from_data, load
-from scene.geometry import area
+from scene.geometry import area, table_at
 from scene.laws import bounds
 from scene.protocol.messages import Introduction
 from theory import predict
@@ -363,6 +364,51 @@ def test_states_are_asked_about_up_to_a_time_that_is_near(profile):
             ahead |= late
             assert all(0.0 <= start["t"] < 3.0 for start in starts)
     assert ahead == {-1.0} if profile == "trajectory" else {0.0, -(2.0**-6)}
+
+
+@pytest.mark.parametrize("scene", [*bad_input.RESTING, load("moving-cap"), Stem(w=1.0, h=1.25, slope=0.25)])
+def test_places_past_the_end_of_a_wall_are_on_its_curve_and_not_on_it(scene):
+    """As far as a sixteenth of its size and as near as 2^-10; of a mushroom's arc one is within the stem."""
+    table = table_at(fp, scene, 0.0)
+    r, w, h = float(table.r), float(table.w), float(table.h)
+    for wall in scene.walls:
+        places = [
+            place for key in range(8) for place in bad_input._past_the_end(Draw(f"ends/{key}"), table, wall)
+        ]
+        in_stem = [(x, y) for x, y in places if wall == "arc" and y < -0.5 * r]
+        ends = {"arc": r, "base": w if isinstance(scene, Stem) else r}
+        for x, y in places:
+            assert abs(table.gap(wall, x, y)) < 1e-12 * table.size
+            if wall == "arc":
+                assert y < 0
+            elif wall == "base":
+                assert 2.0**-10 < abs(x) / ends[wall] - 1 <= 2.0**-4
+            elif wall == "floor":
+                assert 2.0**-10 < abs(x) / table.half_width(-h) - 1 <= 2.0**-4
+            else:
+                assert 2.0**-10 <= max(y / h, -y / h - 1) <= 2.0**-4
+                assert (x < 0) == (wall == "left")
+        past = [place for place in places if place not in in_stem]
+        assert len(past) >= 8 * 6
+        assert {place[wall in ("left", "right")] > 0 for place in past} == {True, False}
+        is_deep = isinstance(scene, Mushroom) and wall == "arc" and h > r * math.sqrt(1 - w * w / 16)
+        assert len(in_stem) == (8 if is_deep else 0)
+        assert all(abs(x) < table.half_width(y) and -h < y for x, y in in_stem)
+
+
+@pytest.mark.parametrize("scene", [*bad_input.RESTING, Stem(w=2.0, h=1.25, slope=0.25), load("moving-cap")])
+def test_a_place_is_moved_inwards_by_a_part_of_the_walls_size(scene):
+    """That is the radius, for a stem's base and for sides the width, for a floor the depth."""
+    table = table_at(fp, scene, 0.0)
+    for wall in scene.walls:
+        x, y = bad_input._place(Draw(f"place/{wall}"), table, wall)
+        assert abs(table.gap(wall, x, y)) < 1e-12 * table.size
+        size = {"arc": table.r, "base": table.w if isinstance(scene, Stem) else table.r, "floor": table.h}
+        for part in (0.0625, -0.0625):
+            to = bad_input.move_inwards(table, wall, x, y, part)
+            moved = math.hypot(to[0] - x, to[1] - y)
+            assert moved == pytest.approx(0.0625 * float(size.get(wall, max(float(table.w), abs(x)))))
+            assert (table.gap(wall, *to) > 0) == (part > 0)
 
 
 TAGGED = {"type": "object", "properties": {"kind": {"enum": ["wave"]}, "x": {"type": "number"}}}

@@ -28,8 +28,7 @@ from fast.kernel.records import (  # isort: skip
     N_HARMONICS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled,
     FloatArray, LaneWaves, LawLimits, LawsInLanes, Pieces,
 )  # fmt: skip
-from scene import Scene, tables
-from scene.laws import breakpoints, is_constant
+from scene import Scene
 
 SHALLOW = 0.25  # of its mean: see `waves_of`
 MAX_PIECES = 2**15
@@ -225,5 +224,5 @@ def _period_and_origin(laws: FloatArray) -> tuple[Fraction, Fraction]:
 
 def _knots(scene: Scene, period: Fraction, origin: Fraction) -> set[Fraction]:
     """Return the times since the origin, inside the period, of all knots and of the middles of legs."""
-    moving = (law for law in tables.laws(scene).values() if not is_constant(law))
-    return {(t - origin) % period for law in moving for t in breakpoints(law)} - {Fraction(0)}
+    moving = (law for law in scene.laws.values() if not law.is_constant)
+    return {(t - origin) % period for law in moving for t in law.breakpoints()} - {Fraction(0)}

@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 
 import msgspec
 
+from scene.laws import WRITTEN
 from scene.load import from_data
 from scene.protocol.messages import (
     MAX_SEQ,
@@ -117,7 +118,7 @@ class _Server:
             "language": "Python",
             "profiles": [profile for profile, function in offered.items() if function is not None],
             "tables": ["cap", "stem", "mushroom"],
-            "laws": ["constant", "fourier", "bang-bang"],
+            "laws": ["constant", *(kind.__struct_config__.tag for kind in WRITTEN)],
         }
 
     def answer(self, command: StepRequest | TrajectoryRequest | FlowRequest | TimeRequest) -> dict[str, Any]:

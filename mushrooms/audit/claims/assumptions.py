@@ -19,12 +19,10 @@ import theory
 from mushrooms.audit.claim import DIGITS, Check, ClaimEvidence
 from mushrooms.audit.claims.experiments import one_cycle
 from mushrooms.audit.claims.finite_energy import ACW
-from mushrooms.audit.runs import RUNS, Sample, run_seed, scene_of
+from mushrooms.audit.runs import RUNS, Sample, at_knots, run_seed, scene_of
 from mushrooms.audit.tolerances import Cdf, FloatArray, Mean, close, exact, fits, mean, share, stated
 from scene import BangBang, Horizon, Mushroom, Scene, State, load
 from scene.geometry import table_at
-from scene.laws import bounds
-from scene.tables import laws, width_factors
 
 SCENES = ("moving-cap", "fixed-cap-clockwise")
 ENERGY = 1e7
@@ -173,11 +171,7 @@ def at_another_pace(legs: np.ndarray) -> Mushroom:
     table = load("fixed-cap-anticlockwise")
     assert isinstance(table, Mushroom)
     times = [0.0, *np.cumsum(legs)[:-1].tolist(), 1.0]
-    h, w = (
-        BangBang(tuple((t, knot[1]) for t, knot in zip(times, law.knots, strict=True)))
-        for law in (table.h, table.w)
-        if isinstance(law, BangBang)
-    )
+    h, w = (BangBang(tuple(zip(times, at_knots(table.laws[name]), strict=True))) for name in ("h", "w"))
     return Mushroom(r=table.r, h=h, w=w, slope=table.slope, name="another-pace")
 
 
@@ -248,9 +242,9 @@ def _at_most_linear(evidence: ClaimEvidence, name: str) -> Check:
 
 def walls_speed(scene: Scene) -> float:
     """Return a bound on the speed across itself of arc, floor and sides at the mouth [length / time]."""
-    speeds = [bounds(law).slope for name, law in laws(scene).items() if name in ("r", "h")]
+    speeds = [law.bounds().slope for name, law in scene.laws.items() if name in ("r", "h")]
     if isinstance(scene, Mushroom):
-        factors = [bounds(law) for law in width_factors(scene)]
+        factors = [law.bounds() for law in scene.width.factors]
         speeds.append(sum(f.slope * math.prod(g.highest for g in factors if g is not f) for f in factors))
     return max(speeds)
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from fast.kernel.arithmetic import HALF_PI, MAX_QUADRANT, SAFETY, split
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, PARABOLA, SERIES, TWO_WAVES, fill_pieces
+from fast.kernel.laws import IN_LANES
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, BANG_BANG, BEND, CONSTANT, DEPTH, FASTEST, FOURIER, HIGHEST, KIND, KNOTS, LEVEL, LOWEST,
@@ -57,8 +58,13 @@ def laws_in_lanes(scene: Scene, compiled: Compiled) -> LawsInLanes:
         scene: in the kernel's units.
         compiled: its numbers.
     """
-    laws, waves = compiled.laws, waves_of(compiled)
-    if waves:
+    laws = compiled.laws
+    is_known = bool(np.isin(laws[:SHARED, KIND], IN_LANES).all())
+    waves = waves_of(compiled) if is_known else None
+    form = PARABOLA
+    if not is_known:
+        pieces = NO_PIECES
+    elif waves:
         form = TWO_WAVES if laws[SHARED, N_HARMONICS] > 1 else ONE_WAVE
         # Of waves the lanes know when they repeat, and up to when their phase is known.
         period = float(_period_and_origin(laws)[0]) if laws[SHARED, OMEGA] else math.inf

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from reference import rational
 from reference.arithmetic import Exhausted, Interval, Undecidable, exact_ends, is_below, sign
 from reference.isolation import Isolator
-from reference.prepared import Prepared
+from reference.prepared import PreparedTable
 from reference.walls import MovingWalls
 from scene import State, Undefined, Wall
 from scene.mpmath_internals import ends
@@ -49,7 +49,7 @@ class Course:
         exact: the state as binary64 numbers, when it is one; decides ties.
     """
 
-    table: Prepared
+    table: PreparedTable
     motion: MovingWalls
     leaving: dict[Wall, Interval]
     is_flat: bool

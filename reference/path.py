@@ -22,7 +22,7 @@ from reference.arithmetic import Arithmetic, Exhausted, Interval, Undecidable, W
 from reference.course import FOR_EVER, Course, Hit
 from reference.jacobian import chained, enclosures, identity, step_jacobian
 from reference.margins import measure
-from reference.prepared import Prepared, prepare
+from reference.prepared import PreparedTable, prepare
 from reference.start import depart
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import (
@@ -173,7 +173,7 @@ def require_digits(found: ProvedCollision, digits: int) -> None:
 
 def _follow(
     arithmetic: Arithmetic,
-    table: Prepared,
+    table: PreparedTable,
     state: State,
     t_end: float | None,
     n_collisions: int,

@@ -21,7 +21,7 @@ from math import lcm
 from typing import NamedTuple
 
 from reference.jets import Jet, multiply
-from reference.prepared import Prepared
+from reference.prepared import PreparedTable
 from reference.walls import wall_function
 from scene import Law, State, Wall
 
@@ -148,7 +148,7 @@ def _rational_jet(f: Fraction, d1: Fraction = Fraction(0), d2: Fraction = Fracti
     return Jet(exact(f), exact(d1), exact(d2))
 
 
-def wall_jet(table: Prepared, state: State, wall: Wall, s: Fraction) -> Jet:
+def wall_jet(table: PreparedTable, state: State, wall: Wall, s: Fraction) -> Jet:
     """Return f, f', f'' of a wall at flight time s, exactly."""
     time, vx, vy = Fraction(state.t) + s, Fraction(state.vx), Fraction(state.vy)
     x = _rational_jet(Fraction(state.x) + vx * s, vx)
@@ -169,7 +169,7 @@ def crossing_time(state: State) -> Fraction | None:
     return -Fraction(state.y) / Fraction(state.vy)
 
 
-def straight_time(table: Prepared, state: State, wall: Wall) -> Fraction | None:
+def straight_time(table: PreparedTable, state: State, wall: Wall) -> Fraction | None:
     """Return the exact flight time to a straight wall of the stem at rest, when it lies ahead.
 
     A wall that is being left and stands still is not met: None.
@@ -184,7 +184,7 @@ def straight_time(table: Prepared, state: State, wall: Wall) -> Fraction | None:
     return -f / rate if f is not None and rate is not None and f > 0 > rate else None
 
 
-def is_zero(table: Prepared, state: State, wall: Wall, s: Fraction) -> bool:
+def is_zero(table: PreparedTable, state: State, wall: Wall, s: Fraction) -> bool:
     """Tell whether f, less its residual f(0) on the wall being left, is known to vanish exactly at s."""
     f: ExactNumber = wall_jet(table, state, wall, s).f
     if wall == state.wall:

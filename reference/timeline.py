@@ -24,7 +24,7 @@ from typing import Any
 
 from reference.arithmetic import Arithmetic, Interval, exact_ends, is_below, sign
 from reference.jets import Jet, united
-from reference.prepared import Prepared
+from reference.prepared import PreparedTable
 from scene import BangBang, Fourier, Law
 from scene.mpmath_internals import ends
 from scene.pieces import PolynomialPiece
@@ -43,7 +43,7 @@ class Timeline:
         instant: the absolute time from which times are counted [time].
     """
 
-    def __init__(self, arithmetic: Arithmetic, table: Prepared, instant: Fraction) -> None:
+    def __init__(self, arithmetic: Arithmetic, table: PreparedTable, instant: Fraction) -> None:
         self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in table.laws.items()}
         length = None if table.cycle is None else table.cycle.value(arithmetic.context)
         self.turn = None if length is None else arithmetic.upper(length)  # a period at least

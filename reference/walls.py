@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from reference.arithmetic import Arithmetic, Interval
 from reference.jets import Jet, add, multiply, negative, square
-from reference.prepared import Prepared
+from reference.prepared import PreparedTable
 from reference.timeline import Timeline
 from scene import Wall
 from scene.mpmath_internals import ends
@@ -40,7 +40,7 @@ class EnclosedFlight(NamedTuple):
 
 
 def wall_function(
-    table: Prepared,
+    table: PreparedTable,
     wall: Wall,
     x: Jet,
     y: Jet,
@@ -70,7 +70,7 @@ def wall_function(
 class MovingWalls:
     """Evaluates the walls along a flight."""
 
-    def __init__(self, arithmetic: Arithmetic, table: Prepared, flight: EnclosedFlight) -> None:
+    def __init__(self, arithmetic: Arithmetic, table: PreparedTable, flight: EnclosedFlight) -> None:
         self.arithmetic = arithmetic
         self.flight = flight
         self.table = table

@@ -150,7 +150,9 @@ def _rational_jet(f: Fraction, d1: Fraction = Fraction(0), d2: Fraction = Fracti
 
 def wall_jet(table: PreparedTable, state: State, wall: Wall, s: Fraction) -> Jet:
     """Return f, f', f'' of a wall at flight time s, exactly."""
-    time, vx, vy = Fraction(state.t) + s, Fraction(state.vx), Fraction(state.vy)
+    time = Fraction(state.t) + s
+    vx = Fraction(state.vx)
+    vy = Fraction(state.vy)
     x = _rational_jet(Fraction(state.x) + vx * s, vx)
     y = _rational_jet(Fraction(state.y) + vy * s, vy)
 
@@ -180,7 +182,8 @@ def straight_time(table: PreparedTable, state: State, wall: Wall) -> Fraction | 
     if not all(table.laws[name].is_constant for name in moving):
         return None
     jet = wall_jet(table, state, wall, Fraction(0))
-    f, rate = jet.f.fraction(), jet.d1.fraction()
+    f = jet.f.fraction()
+    rate = jet.d1.fraction()
     return -f / rate if f is not None and rate is not None and f > 0 > rate else None
 
 

@@ -35,14 +35,17 @@ def depart(
     wall = _wall_left(table, state, motion)
     if isinstance(wall, Undefined):
         return wall
-    leaving, is_flat = {}, False
+    leaving = {}
+    is_flat = False
     if wall is not None:
         judged = _judge_rise(table, state, wall, motion)
         if isinstance(judged, Undefined):
             return judged
-        leaving, is_flat = {wall: motion.wall(wall, arithmetic.zero).f}, judged
+        leaving = {wall: motion.wall(wall, arithmetic.zero).f}
+        is_flat = judged
     # New walls without cached values: the work of the flight then does not depend on the start.
-    motion, in_cap = motion_at(table, state, arithmetic), _is_in_cap(table, state, leaving)
+    motion = motion_at(table, state, arithmetic)
+    in_cap = _is_in_cap(table, state, leaving)
     end = None if t_end is None else t_end - motion.flight.instant
     return Course(table, motion, leaving, is_flat, in_cap, end, state)
 
@@ -153,7 +156,8 @@ def _judge_rise(table: PreparedTable, state: State, wall: Wall, motion: MovingWa
 
 def _check_residual(table: PreparedTable, state: State, motion: MovingWalls) -> None:
     """Refuse a state too far from the wall it names, as measured by that wall's present size."""
-    wall, zero = state.wall, motion.arithmetic.zero
+    wall = state.wall
+    zero = motion.arithmetic.zero
     assert wall is not None
     size = _distance_of(table, wall, motion)
     gap = motion.wall(wall, zero).f

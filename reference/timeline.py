@@ -31,7 +31,9 @@ from scene.pieces import PolynomialPiece
 
 ORDER = 8
 # In evaluations of a parabola, as measured: a wave; an expansion, and a wave of it.
-WORK_OF_A_WAVE, WORK_OF_AN_EXPANSION, WORK_OF_AN_EXPANDED_WAVE = 1.5, 4, 2
+WORK_OF_A_WAVE = 1.5
+WORK_OF_AN_EXPANSION = 4
+WORK_OF_AN_EXPANDED_WAVE = 2
 
 
 class Timeline:
@@ -198,7 +200,9 @@ class Waves:
     def _summed(self, s: Interval) -> Jet:
         """Sum the harmonics and their derivatives."""
         self.arithmetic.spend(WORK_OF_A_WAVE * len(self.terms))
-        f, d1, d2 = self.mean, self.arithmetic.zero, self.arithmetic.zero
+        f = self.mean
+        d1 = self.arithmetic.zero
+        d2 = self.arithmetic.zero
         for frequency, wave, quadrature in self._waves(s):
             f = f + wave
             d1 = d1 + frequency * quadrature
@@ -225,7 +229,9 @@ class Waves:
 
     def _waves(self, s: Interval) -> list[tuple[Interval, Interval, Interval]]:
         """Return frequency, value, and rate / frequency of each wave k."""
-        found, phase, zero = [], self.phase + self.omega * s, self.arithmetic.zero
+        found = []
+        phase = self.phase + self.omega * s
+        zero = self.arithmetic.zero
         for k, frequency, a, b in self.terms:
             cos, sin = self.arithmetic.cos_sin(k * phase)
             wave, quadrature = zero, zero

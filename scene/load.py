@@ -178,7 +178,8 @@ def json_schema() -> dict[str, Any]:
 
 def limit_definitions(definitions: dict[str, Any]) -> None:
     """Put what a schema can say of the rules for scenes (`scene.protocol.rules`) into its definitions."""
-    fourier, knots = definitions["Fourier"], definitions["BangBang"]["properties"]["knots"]
+    fourier = definitions["Fourier"]
+    knots = definitions["BangBang"]["properties"]["knots"]
     for field in ("omega", "period"):
         fourier["properties"][field] = {"type": "number", "exclusiveMinimum": 0}
     fourier["oneOf"] = [{"required": ["omega"]}, {"required": ["period"]}]

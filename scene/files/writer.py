@@ -72,5 +72,6 @@ def unsealed(path: Path) -> bytes | None:
         found = path.read_bytes()
     except OSError:
         return None
-    content, seal = found[:-SEAL], found[-SEAL:]
+    content = found[:-SEAL]
+    seal = found[-SEAL:]
     return content if hashlib.sha256(content).digest() == seal else None

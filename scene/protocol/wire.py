@@ -86,8 +86,11 @@ class _Server:
         flow: Flowing | None,
         timer: Timer | None,
     ) -> None:
-        self.name, self.stepper, self.follower = name, stepper, follower
-        self.flow, self.timer = flow, timer
+        self.name = name
+        self.stepper = stepper
+        self.follower = follower
+        self.flow = flow
+        self.timer = timer
 
     def run(self, lines: BinaryIO, out: BinaryIO) -> None:
         for line in lines:

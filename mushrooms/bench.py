@@ -6,7 +6,9 @@ Our steppers are among the solvers that are measured, and the proofs are what al
 import math
 import tempfile
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.markup import escape
@@ -58,18 +60,39 @@ LANES_SERVE = (
 )  # fmt: skip
 
 
-def measure_solvers(
-    command: list[str], out: Path, quick: bool, seed: int, table: Path | None, workload: str | None
-) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchOptions:
+    """The options of `mushrooms bench`.
+
+    Attributes:
+        command: program and arguments of another stepper to measure.
+        out: folder for the results.
+        quick: fewer questions and runs.
+        seed: of the questions.
+        table: an earlier bench.json, of which a table is printed.
+        workload: of the table; None for the headline's.
+    """
+
+    command: Sequence[str] | None
+    out: Path
+    quick: bool
+    seed: int
+    table: Path | None
+    workload: str | None
+
+
+def measure_solvers(options: BenchOptions) -> None:
     """Measure speed against error and write it into a folder; or print a table of an earlier benchmark."""
-    if table is not None:
-        refuse_unheeded({"--quick": quick or None, "COMMAND": command or None}, "--table measures nothing")
-        print(bench_page.to_markdown(record.read(table), workload or bench_page.HEADLINE), end="")
+    if options.table is not None:
+        measuring = {"--quick": options.quick or None, "COMMAND": options.command or None}
+        refuse_unheeded(measuring, "--table measures nothing")
+        earlier = record.read(options.table)
+        print(bench_page.to_markdown(earlier, options.workload or bench_page.HEADLINE), end="")
         return
-    refuse_unheeded({"--workload": workload}, "it needs --table")
-    size: Size = "quick" if quick else "full"
-    with writable_folder(out) as folder, announce_compilation():
-        found = _measure(size, seed, command)
+    refuse_unheeded({"--workload": options.workload}, "it needs --table")
+    size: Size = "quick" if options.quick else "full"
+    with writable_folder(options.out) as folder, announce_compilation():
+        found = _measure(size, options.seed, options.command or [])
         picture = style.svg(bench_page.headline(found))
         write_files(
             folder,
@@ -86,10 +109,12 @@ def measure_solvers(
     print(f"{found.seconds:.0f} s. Report: {folder / 'bench.html'}")
 
 
-def _measure(size: Size, seed: int, command: list[str]) -> Record:
+def _measure(size: Size, seed: int, command: Sequence[str]) -> Record:
     """Run everything."""
     begin = time.monotonic()
-    n_questions, n_further, repeats = QUESTIONS[size], FURTHER[size], REPEATS[size]
+    n_questions = QUESTIONS[size]
+    n_further = FURTHER[size]
+    repeats = REPEATS[size]
     effort = solvers.Effort(repeats, *LASTING[size])
     with ExitStack() as stack:
         bar = stack.enter_context(progress_bar())
@@ -130,11 +155,12 @@ def _measure(size: Size, seed: int, command: list[str]) -> Record:
     )
 
 
-def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
+def _solvers(stack: ExitStack, command: Sequence[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
     """Return solvers, what was compiled, and what cannot run."""
     limits = Limits(TIMEOUT, RESTARTS)
     found = [*our_solvers(), *baselines.in_python()]
-    built, not_run = dict[str, str](), dict[str, str]()
+    built = dict[str, str]()
+    not_run = dict[str, str]()
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     try:
         library, built["lean C"] = baselines.build(folder, baselines.FLAGS)
@@ -224,10 +250,12 @@ def _lanes(workload: Workload, n_times: int) -> SolverRun:
     copies = -(-128 // len(states))  # enough to fill both pools
     followed = states[:1] if workload.rule.length else states * copies
     t_end = workload.end(workload.rule.length or FLIGHTS)
-    seconds, n_collisions = 0.0, 0
+    seconds = 0.0
+    n_collisions = 0
     for _ in range(n_times):
         run, lasted = carry(workload.scene, followed, [None] * len(followed), t_end, 1)
-        n_collisions, seconds = n_collisions + int(run.wall_counts.sum()), seconds + lasted
+        n_collisions = n_collisions + int(run.wall_counts.sum())
+        seconds = seconds + lasted
     return SolverRun(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
 
 

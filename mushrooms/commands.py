@@ -1,7 +1,8 @@
 """The commands: their options and their help.
 
-This module imports typer and the standard library alone. The body of each command imports the function that
-does its work, and hands it the options in their order; so no `--help` waits for numba or matplotlib.
+This module imports typer and the standard library alone. The body of each command makes one record of its
+options and hands it to the function that does the work. It imports both, so no `--help` waits for numba or
+matplotlib.
 """
 
 import math
@@ -100,9 +101,10 @@ def scenes(
     as_json: AsJson = False,
 ) -> None:
     """List the catalogue. A scene that is refused is shown with the reason. With NAME print that scene."""
-    from mushrooms.scenes import print_scenes
+    from mushrooms.scenes import ScenesOptions, print_scenes
 
-    print_scenes(name, as_toml, as_json)
+    options = ScenesOptions(name=name, as_toml=as_toml, as_json=as_json)
+    print_scenes(options)
 
 
 @app.command(epilog="Example: mushrooms theory moving-cap --digits 40")
@@ -119,9 +121,10 @@ def theory(
     fixed caps, ergodic, retraced-arc, the scenes of the audit, and the reverses of all these. For another
     scene only the limit of high energies is printed, and a line on stderr says why.
     """
-    from mushrooms.scenes import print_prediction
+    from mushrooms.scenes import TheoryOptions, print_prediction
 
-    print_prediction(scene, digits, energy, as_json)
+    options = TheoryOptions(scene=scene, digits=digits, energy=energy, as_json=as_json)
+    print_prediction(options)
 
 
 Picture = Annotated[
@@ -198,17 +201,20 @@ def draw(
     """
     from mushrooms.draw import DrawOptions, draw_scene
 
-    asked = {
-        "trajectory": trajectory,
-        "section": section,
-        "map": boundary_map,
-        "growth": growth,
-        "lyapunov": lyapunov,
-    }
-    options = DrawOptions(energy, collisions, cycles, particles, seed, phase)
-    draw_scene(scene, out, [kind for kind in asked if asked[kind]], export, options)
+    options = DrawOptions(
+        scene=scene, out=out, trajectory=trajectory, section=section, boundary_map=boundary_map,
+        growth=growth, lyapunov=lyapunov, export=export, energy=energy, collisions=collisions,
+        cycles=cycles, particles=particles, seed=seed, phase=phase,
+    )  # fmt: skip
+    draw_scene(options)
 
 
+Resume = Annotated[
+    bool,
+    typer.Option(
+        "--resume", help="Continue the run in DIR; with more --particles or more --cycles, extend it."
+    ),
+]
 Phases = Annotated[
     str | None,
     typer.Option(
@@ -230,12 +236,7 @@ def simulate(
     out: Annotated[
         Path | None, file("Folder for the run (ensemble.zarr) and summary.json.", metavar="DIR")
     ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume", help="Continue the run in DIR; with more --particles or more --cycles, extend it."
-        ),
-    ] = False,
+    resume: Resume = False,
     dask: Annotated[
         str | None,
         typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers simulate the blocks."),
@@ -270,12 +271,14 @@ def simulate(
     On stderr: progress and the time left, after 20 s and then every minute; a note if scalar steps took over
     a tenth of the time; a note if the prediction is the limit of high energies.
     """
-    from mushrooms.simulate import simulate_scene
+    from mushrooms.simulate import SimulateOptions, simulate_scene
 
-    simulate_scene(
-        scene, particles, energy, cycles, seed, phases, out, resume, dask, block, max_collisions, max_seconds,
-        plot, threads, as_json,
+    options = SimulateOptions(
+        scene=scene, particles=particles, energy=energy, cycles=cycles, seed=seed, phases=phases,
+        out=out, resume=resume, dask=dask, block=block, max_collisions=max_collisions,
+        max_seconds=max_seconds, plot=plot, threads=threads, as_json=as_json,
     )  # fmt: skip
+    simulate_scene(options)
 
 
 @app.command(epilog="Example: mushrooms export run --to run.csv")
@@ -287,9 +290,10 @@ def export(
 
     The run is read block by block and its checksums are tested. A damaged run is refused.
     """
-    from mushrooms.store.export import export_run
+    from mushrooms.store.export import ExportOptions, export_run
 
-    export_run(run, to)
+    options = ExportOptions(run=run, to=to)
+    export_run(options)
 
 
 @app.command(epilog="Example: mushrooms attack --family knot-at-event --cases 20000 --seed 1")
@@ -310,9 +314,16 @@ def attack(
 
     Exit code 1 if an answer is wrong or the reference took over 10 s, 2 on bad input, else 0.
     """
-    from mushrooms.questions import attack_steppers
+    from mushrooms.questions import AttackOptions, attack_steppers
 
-    return attack_steppers(family, cases, seed, stepper, json_file)
+    options = AttackOptions(
+        family=family,
+        cases=cases,
+        seed=seed,
+        stepper=stepper,
+        json_file=json_file,
+    )
+    return attack_steppers(options)
 
 
 @app.command(epilog="Example: mushrooms audit --only X2,L4 --out audit-report")
@@ -357,11 +368,14 @@ def audit(
     Exit code 0 if every claim has its expected verdict, 1 if one has not, 2 on bad input.
     """
     from mushrooms.audit.command import audit_claims
+    from mushrooms.audit.options import AuditOptions
 
-    return audit_claims(
-        out, full, only, seed, threads, resume, commands, as_json,
-        ensemble, scene, backwards, energy, energy_unit, time_unit, particles,
+    options = AuditOptions(
+        out=out, full=full, only=only, seed=seed, threads=threads, resume=resume, commands=commands,
+        as_json=as_json, ensemble=ensemble, scene=scene, backwards=backwards, energy=energy,
+        energy_unit=energy_unit, time_unit=time_unit, particles=particles,
     )  # fmt: skip
+    return audit_claims(options)
 
 
 @app.command(epilog="Example: mushrooms bench --quick --out bench-report")
@@ -386,9 +400,17 @@ def bench(
 
     Exit code 0, or 2 on bad input.
     """
-    from mushrooms.bench import measure_solvers
+    from mushrooms.bench import BenchOptions, measure_solvers
 
-    measure_solvers(command or [], out, quick, seed, table, workload)
+    options = BenchOptions(
+        command=command,
+        out=out,
+        quick=quick,
+        seed=seed,
+        table=table,
+        workload=workload,
+    )
+    measure_solvers(options)
 
 
 @app.command(epilog="Example: mushrooms check --html report.html -- ./my_stepper")
@@ -430,23 +452,14 @@ def check(
 
     Exit code 0 if everything passes, 1 if something fails, 2 if the options or the suite are at fault.
     """
-    from mushrooms.check import check_stepper, require_corpus
+    from mushrooms.check import CheckOptions, check_stepper
 
-    require_corpus(corpus)
-    files = {"json": json_file, "junit": junit, "html": html, "badge": badge, "summary": summary}
-    return check_stepper(
-        command or [],
-        level,
-        seed,
-        timeout,
-        total,
-        restarts,
-        groups,
-        known_failures,
-        files,
-        questions,
-        answers,
-    )
+    options = CheckOptions(
+        command=command, level=level, seed=seed, timeout=timeout, total=total, restarts=restarts,
+        groups=groups, known_failures=known_failures, json_file=json_file, junit=junit, html=html,
+        badge=badge, summary=summary, questions=questions, answers=answers, corpus=corpus,
+    )  # fmt: skip
+    return check_stepper(options)
 
 
 @app.command(epilog="Example: mushrooms verify steps.csv --scene moving-cap --picture false.svg")
@@ -473,9 +486,17 @@ def verify(
     The errors are estimates, not proofs. At the end the worst and the mean errors are printed, and each bias
     over the path. Exit code 0 if every step agrees, 1 if one does not, 2 on bad input.
     """
-    from mushrooms.questions import verify_file
+    from mushrooms.questions import VerifyOptions, verify_file
 
-    return verify_file(file, scene, picture, t_end, within, is_all)
+    options = VerifyOptions(
+        file=file,
+        scene=scene,
+        picture=picture,
+        t_end=t_end,
+        within=within,
+        is_all=is_all,
+    )
+    return verify_file(options)
 
 
 @app.command(epilog="Example: mushrooms ask near-corner/3 -- ./my_stepper")
@@ -496,6 +517,7 @@ def ask(
 
     Exit code 0; 1 if the stepper does not pass; 2 on bad input.
     """
-    from mushrooms.questions import ask_case
+    from mushrooms.questions import AskOptions, ask_case
 
-    return ask_case(case, command, seed, as_json)
+    options = AskOptions(case=case, command=command, seed=seed, as_json=as_json)
+    return ask_case(options)

@@ -11,7 +11,7 @@ import pytest
 from conformance.cases.draw import Draw
 from conformance.profiles import margin
 from conformance.suite import pytest_plugin
-from conformance.suite.checks import bad_input, flows, path_judge, spelling
+from conformance.suite.checks import bad_input, flows, form, path_judge, spelling, timing
 from conformance.suite.checks.form import Implementation, octaves
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import graded_parts
@@ -19,6 +19,7 @@ from conformance.vectors import Vector, question
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, load
 from scene.geometry import area
 from scene.laws import bounds
+from scene.protocol.messages import Introduction
 from theory import predict
 
 SCENE, START = Cap(r=1.0), State(0.0, 0.0, 0.25, 0.0, 1.0)
@@ -183,6 +184,135 @@ def test_a_mean_growth_is_asked_of_as_many_particles_as_tell_it_from_0(energy, b
         flows._mean_growth(asked, scene, flows.Size(least - 1, energy, bias), 1)
 
 
+OPEN_STEP = {"cmd": "step", "scene": {"r": 1.0}, "state": {"x": 1.0}, "t_end": 1.0}
+OFFERED = Introduction(1, "it", "1", "Python", ("step", "flow"), ("cap",), ("constant",))
+VERDICTS = [  # what is found of each of four questions; verdict, reason, answers and undecided ones
+    ([True, True, True, True], "pass", "4 of 4 compared", (0, 0)),
+    ([True, False, False, False], "pass", "1 of 4 compared", (0, 0)),
+    (["one", "two", "three", "four"], "pass", "one; two; three; four", (0, 0)),
+    ([False] * 4, "unsupported", "nothing to compare", (0, 0)),
+    ([CheckFailure("unsupported", "law fourier")] * 4, "unsupported", "law fourier", (0, 0)),
+    ([CheckFailure("declined", "shy")] * 4, "declined", "shy; shy; shy; shy", (0, 0)),
+    ([CheckFailure("declined", "shy"), True, True, True], "pass", "shy", (0, 0)),
+    (["undecided", True, True, True], "pass", "3 of 4 compared; 1 of 4 answers are undecided", (4, 1)),
+    (["undecided"] * 4, "declined", "0 of 4 compared; 4 of 4 answers are undecided", (4, 4)),
+    (["undecided", False, False, False], "declined", "0 of 4 compared; 1 of 4 answers are undecided", (4, 1)),
+    ([True, AssertionError("it is off")], "fail", "step: it is off", (0, 0)),
+    ([OverflowError("too large")], "fail", "step: its answers cannot be calculated with: too large", (0, 0)),
+    ([CheckFailure("timed-out", "slow")], "timed-out", "step: slow", (0, 0)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("findings", "verdict", "why", "counts"), VERDICTS, ids=range(len(VERDICTS)))
+def test_a_check_comes_to_a_verdict_from_what_it_found(findings, verdict, why, counts):
+    """It ends at the first fault, which it gives as a test to paste."""
+    asked = []
+
+    def judge(side, _scene, number):
+        asked.append(number)
+        found = findings[number]
+        if "undecided" in findings:
+            said = "undecided" if found == "undecided" else "collision"
+            side.answers.add({**OPEN_STEP, "t_end": float(number)}, [said])
+        if isinstance(found, Exception):
+            raise found
+        return found is True if found == "undecided" or isinstance(found, bool) else found
+
+    check = form.SuiteCheck(
+        "promise/one-thing", lambda *_: [(SCENE, k) for k in range(len(findings))], judge, ("step",)
+    )
+    found = form.run_check(check, SimpleNamespace(introduction=OFFERED), 1)
+    assert (found.id, found.group) == ("promise/one-thing", "promise")
+    assert (found.verdict, found.why) == (verdict, why)
+    assert (found.n_answers, found.n_undecided) == counts
+    is_fault = verdict in ("fail", "timed-out")
+    assert asked == list(range(len(findings)))
+    assert ("def test_promise_one_thing(asked):" in found.paste) is is_fault
+    assert (f"@example({(SCENE, asked[-1])!r})" in found.paste) is is_fault
+
+
+@pytest.mark.parametrize(
+    ("tables", "n_drawn", "lacking"),
+    [
+        (["cap", "cap", "cap", "cap"], 1, ""), (["cap", "stem", "cap", "stem"], 1, "table stem"),
+        (["cap", "stem", "stem", "stem"], 2, "table stem"), (["cap", *["stem"] * 5], 3, "table stem"),
+        (["stem"] * 4, 6, "table stem"),
+    ],
+)  # fmt: skip
+def test_questions_are_drawn_anew_while_fewer_than_half_may_be_asked(tables, n_drawn, lacking):
+    drawn = []
+
+    def asks(draw, profile):
+        drawn.append((draw, profile))
+        return [({"cap": SCENE, "stem": Stem(w=1.0, h=1.0)}[name], k) for k, name in enumerate(tables)]
+
+    check = form.SuiteCheck("promise/x", asks, lambda *_: True)
+    fitting, found = form._draw_asked(check, OFFERED, "step", 7)
+    assert [profile for _, profile in drawn] == ["step"] * n_drawn
+    assert fitting == [(SCENE, k) for k, name in enumerate(tables) if name == "cap"] * n_drawn
+    assert found == lacking
+    numbers = {draw.part() for draw, _ in drawn}
+    assert len(numbers) == n_drawn  # from streams of their own
+    assert form._draw_asked(check, OFFERED, "trajectory", 7) == ([], "profile trajectory")
+    assert len(drawn) == n_drawn
+
+
+def test_an_answer_of_another_number_of_outcomes_counts_as_one_question():
+    """A flow that is refused as a whole, a path of any length: undecided ones among them count."""
+    flow = {"cmd": "flow", "scene": {"r": 1.0}, "states": [{"x": 1.0}, {"x": 2.0}], "t_end": 1.0}
+    tally = form.AnswerTally()
+    tally.add(flow, ["undecided"])
+    assert tally.counts() == (1, 1)
+    tally.add({**flow, "cmd": "trajectory"}, ["collision"] * 3)
+    tally.add({**OPEN_STEP, "cmd": "trajectory"}, ["collision", "undecided", "undecided"])
+    assert tally.counts() == (3, 7)
+
+
+# A repeat lasts .1 s, and an answer .05 s more, the delay. What a program says otherwise, in nanoseconds:
+# of a first start, of each of many repeats, of the least of them, of a path twice as long; and the objection.
+CLOCKS = [
+    ({}, ""),
+    ({"many": 0.026e9}, ""),
+    ({"many": 0.024e9}, "makes the answer 100000000 ns later"),
+    ({"many": 0.39e9, "first": 0.1e9, "twice": 0.6e9}, ""),
+    ({"many": 0.41e9, "first": 0.1e9, "twice": 0.6e9}, "8 repeats are said to last 410000000 ns each"),
+    ({"first": 0.39e9}, ""),
+    ({"first": 0.41e9}, "a new start is said to last 410000000 ns, the same again 100000000 ns"),
+    ({"twice": 0.131e9}, ""),
+    ({"twice": 0.129e9}, "10 collisions are said to last 100000000 ns, 20 of them 129000000 ns"),
+    ({"delay": 0.2}, ""),  # 32 repeats are asked for, as 8 do not make the answer come much later
+    ({"delay": 0.2, "many": 0.024e9}, "makes the answer 100000000 ns later"),
+    ({"least": 0.051e9, "first": 0.2e9}, ""),  # the others waited, and so did the first
+    (
+        {"least": 0.049e9, "first": 0.2e9},
+        "a new start is said to last 200000000 ns, the same again 49000000 ns",
+    ),
+]
+
+
+@pytest.mark.parametrize(("clock", "said"), CLOCKS, ids=range(len(CLOCKS)))
+def test_a_clock_is_held_to_the_time_that_passes(monkeypatch, clock, said):
+    usual = {"first": 0.1e9, "many": 0.1e9, "twice": 0.2e9, "delay": 0.05, "least": math.inf}
+    known = usual | clock
+    asked = []
+
+    def timed(_session, _scene, _state, n, repeat):
+        asked.append((n, repeat))
+        ns = known["twice" if n == 20 else "many"]
+        each = [ns] * repeat
+        if n == 10:
+            each[0] = min(ns, known["least"])
+        return timing.Timing([int(one) for one in each], known["delay"] + 0.1 * repeat * n / 10, None)
+
+    monkeypatch.setattr(timing, "timed", timed)
+    ones = [timing.Timing([int(known["first"] * k)], known["delay"] + 0.1 * k, None) for k in (2, 1, 3)]
+    found = timing._objection(None, SCENE, START, 10, ones)
+    assert said in found
+    assert bool(found) == bool(said)
+    repeats = [8, 32] if 0.8 + known["delay"] < 3 * (0.1 + known["delay"]) else [8]
+    assert asked == [*((10, repeat) for repeat in repeats), (20, 3)]
+
+
 FALLING = State(0.0, 0.125, 0.5, 0.0, -1.0)
 # Of a fall to the base, which ends at (0.125, 0) at t = 0.5: what is changed, and what is said.
 SPOILT: list[tuple[dict[str, Any], str]] = [
@@ -220,11 +350,13 @@ def test_states_are_asked_about_up_to_a_time_that_is_near(profile):
 
 TAGGED = {"type": "object", "properties": {"kind": {"enum": ["wave"]}, "x": {"type": "number"}}}
 TWICE = {"type": "object", "properties": {"kind": {"enum": ["wave"]}, "wall": {"enum": ["arc"]}}}
+FIRST = {"type": "object", "properties": {"kind": {"enum": ["wave", "legs"]}}}
 FORMS: list[tuple[dict[str, Any], Any, bool]] = [
     ({"type": "null"}, None, True), ({"type": "null"}, 1.0, False), ({"type": "number"}, None, False),
     ({"type": "boolean"}, True, True), ({"type": "integer"}, True, False), ({"type": "number"}, True, False),
     ({"type": "integer"}, 1, True), ({"type": "number"}, 1, True), ({"type": "integer"}, 1.0, False),
     ({"type": "number"}, 1.0, True), ({"type": "string"}, "1.0", True), ({"type": "number"}, "1.0", False),
+    (FIRST, {"kind": "wave"}, True), (FIRST, {}, True), (FIRST, {"kind": "legs"}, True),
     ({"enum": ["arc"]}, "arc", True), ({"enum": ["arc"]}, 1.0, False), ({"type": "array"}, [1.0], True),
     ({"type": "array"}, (1.0,), True), ({"type": "object"}, [1.0], False), ({"type": "array"}, {}, False),
     ({"type": ["number", "null"]}, None, True), ({"type": ["number", "null"]}, "x", False),

@@ -18,6 +18,7 @@ from conformance.suite import run as suite, sheet as sheets
 from conformance.suite.checks import flows
 from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
+from scene import BadInput
 
 SEED = 5
 ALL_CHECKS = dict(sheets.CHECKS)
@@ -210,6 +211,58 @@ def test_bad_answers_are_refused_in_one_line(name, tmp_path, command_line):
     if content is not None:
         (tmp_path / file).write_bytes(content if isinstance(content, bytes) else content.encode())
     assert_refused(command_line("check", "--answers", tmp_path / file, "--seed", 5), message)
+
+
+HORIZON = {"outcome": "horizon", "t": "1", "wall": "", "dt": "", "reason": ""}
+ROWS = [  # the cells of a row, and the outcome that they are
+    ({**HORIZON, "x": "0x1p-1"}, {"outcome": "horizon", "reason": "", "t": 1.0, "x": 0.5}),
+    (
+        {**HORIZON, "t_in": "0.25", "t_out": "2"},
+        {"outcome": "horizon", "reason": "", "t": 1.0, "captured": [0.25, 2.0]},
+    ),
+    ({**HORIZON, "t_in": "", "t_out": ""}, {"outcome": "horizon", "reason": "", "t": 1.0, "captured": None}),
+    ({**HORIZON, "t_in": ""}, {"outcome": "horizon", "reason": "", "t": 1.0, "captured": None}),
+    ({**HORIZON, "t_out": ""}, {"outcome": "horizon", "reason": "", "t": 1.0, "captured": None}),
+    ({**HORIZON, "t_in": "0.25"}, {"outcome": "horizon", "reason": "", "t": 1.0, "captured": [0.25]}),
+    (
+        {"outcome": "collision", "wall": "arc", "dt": "1D-3", "vx": "-2", "t_in": "", "t_out": ""},
+        {"outcome": "collision", "reason": "", "wall": "arc", "dt": 1e-3, "vx": -2.0},
+    ),
+    ({"outcome": "undecided", "reason": "shy", "t": ""}, {"outcome": "undecided", "reason": "shy"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("cells", "outcome"), ROWS, ids=range(len(ROWS)))
+def test_a_row_is_the_outcome_that_it_holds(cells, outcome):
+    """A table with either column of capture intervals tells of each end whether it is captured."""
+    assert sheets._outcome("row", cells) == outcome
+
+
+def test_lines_of_answers_are_told_apart_by_what_they_hold(tmp_path):
+    path = tmp_path / "a.jsonl"
+    lines = [
+        b'{"protocol":1}',
+        LINE.strip().encode() % 7,
+        b'{"values":[1.0]}',
+        b" ",
+        LINE.strip().encode() % 3,
+        b'{"values":[2.0]}',
+    ]
+    path.write_bytes(b"\n".join(lines))
+    found = sheets.read_answers(path)
+    assert found.lines == {7: lines[1], 3: lines[4]}
+    assert (found.introduction, found.echoes) == (lines[0], (lines[2], lines[5]))
+    assert found.places == {7: f"answers {str(path)!r}:2", 3: f"answers {str(path)!r}:5"}
+
+
+def test_a_folder_of_answers_is_read_in_the_order_of_its_files(tmp_path):
+    for name, rows in (("b.csv", ROW.replace("1,coll", "2,coll")), ("a.csv", ROW + ROW), ("c.txt", "no")):
+        (tmp_path / name).write_text(HEADER + rows)
+    found = sheets.read_answers(tmp_path)
+    assert [(seq, len(json.loads(line))) for seq, line in found.lines.items()] == [(1, 2), (2, 1)]
+    (tmp_path / "d.csv").write_text(HEADER + ROW)
+    with pytest.raises(BadInput, match="seq = 1 is answered twice"):
+        sheets.read_answers(tmp_path)
 
 
 def test_the_command_writes_questions_and_grades_answers(tmp_path, command_line):

@@ -35,7 +35,7 @@ from mushrooms.audit.ensemble_checks import (
     nu_at,
     reversal,
 )  # fmt: skip
-from mushrooms.audit.ensemble_command import EnsembleAudit, Options
+from mushrooms.audit.ensemble_command import EnsembleAudit, Reading
 from scene import Fourier, Mushroom, load
 from scene.geometry import table_at
 from scene.laws import value
@@ -44,7 +44,7 @@ SCENE, ENERGY = load("moving-cap"), 1e6
 CLOCK = load("fixed-cap-anticlockwise")  # of period 1
 THEIRS = expected(SCENE, ENERGY)
 OWN = Mushroom(r=1.0, h=Fourier(1.0, 1.0, (), (0.3,)), nu=Fourier(0.7, 1.0, (0.3,)), slope=0.0)
-PLAIN = Options(ENERGY, "v2/2", None, None)
+PLAIN = Reading(ENERGY, "v2/2", None, None)
 SPAN = 2 * math.pi
 
 

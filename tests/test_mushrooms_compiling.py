@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from numba import config
@@ -65,6 +66,31 @@ def test_what_is_compiled_together_is_announced_once(capsys):
     with progress.announce_compilation():
         compile_again(scalar_step.scalar_step, *loops, follow.follow_particles, fine_step.fine_path)
     assert capsys.readouterr().err == SLOW + FINE
+
+
+@pytest.mark.parametrize(
+    ("module", "cache", "said"),
+    [
+        ("fast.kernel.worker", "kept", SLOW),
+        (
+            "fast.kernel.worker",
+            "",
+            SLOW.replace("kept for next time", "no folder can be written in to keep it"),
+        ),
+        ("faster.worker", "kept", ""),
+        ("somebody.worker", "kept", ""),
+    ],
+)
+def test_only_our_kernels_are_announced_and_whether_they_are_kept(capsys, module, cache, said):
+    """A program beside ours may compile a function that is called as one of ours."""
+
+    def loop():
+        """Stand for a kernel."""
+
+    loop.__module__ = module
+    with progress.announce_compilation():
+        compile_again(SimpleNamespace(py_func=loop, stats=SimpleNamespace(cache_path=cache)))
+    assert capsys.readouterr().err == said
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ from mushrooms.figures import energies, orbits as pictures, style, table as tabl
 from mushrooms.figures.heating import Loop, fastest, moving_cap, phase_diagram, supremum, switched
 from mushrooms.reports.page import as_json, typeset
 from scene import BangBang, Mushroom, load
+from scene.geometry import table_at
 from scene.laws import value
 
 STATIC = scenes.load("frozen-mushroom")
@@ -55,6 +56,16 @@ def test_an_orbit_is_the_particle_of_the_ensemble(moving):
         whole = fast.trajectory(MOVING, orbit.start, 10**6, math.tau).outcome
         assert isinstance(whole, scenes.Horizon)
         assert whole.x == pytest.approx(ensemble.x[i], abs=1e-6)
+
+
+@pytest.mark.parametrize("crossings", [60.0, 4.0])
+def test_a_particle_of_the_usual_energy_crosses_the_table_so_often_in_a_cycle(crossings):
+    """A table at rest has no cycle: there the speed is 1 for sixty crossings."""
+    for scene in (MOVING, load("fermi-ulam"), load("fixed-cap-clockwise")):
+        speed = (2 * orbits.usual_energy(scene, crossings)) ** 0.5
+        assert speed * scene.period == pytest.approx(crossings * table_at(fp, scene, 0.0).size)
+    assert (2 * orbits.usual_energy(STATIC, crossings)) ** 0.5 == pytest.approx(crossings / 60)
+    assert orbits.usual_energy(MOVING) == orbits.usual_energy(MOVING, 60.0)
 
 
 def test_places_between_collisions_are_on_the_path(moving):
@@ -164,6 +175,32 @@ def test_a_chaotic_orbit_stretches_and_an_island_keeps_its_angle_and_does_not():
     assert abs(lyapunov.stretching(whispering(n=64)).exponent) < 3 * math.log(64) / 64
     with pytest.raises(scenes.BadInput, match="collisions = 31, must be >= 32"):
         lyapunov.stretching(whispering(n=31))
+
+
+def test_a_stretch_is_that_of_one_deviation_in_units_of_the_table_and_the_speed(monkeypatch):
+    """It begins at right angles to the motion. Against the product of all Jacobians, and blocks by hand."""
+    [orbit] = orbits.follow(MOVING, 37, energy=2.0, seed=4)
+    random = np.random.default_rng(1).normal(0.0, 1.0, (37, 5, 5))
+    monkeypatch.setattr(lyapunov, "jacobians", lambda *_: random)
+    found = lyapunov.stretching(orbit)
+    states = orbit.states()
+    size = max(np.ptp(states[:, 1]), np.ptp(states[:, 2]))
+    speeds = [math.hypot(*row[3:]) for row in states.tolist()]
+    assert max(speeds) > 1.2 * min(speeds)
+    vx, vy = states[0, 3:] / speeds[0]
+    deviation = np.array([0.0, -size * vy, size * vx, -speeds[0] * vy, speeds[0] * vx]) / math.sqrt(2)
+    sizes = [1.0]
+    for matrix, speed in zip(random, speeds[1:], strict=True):
+        deviation = matrix @ deviation
+        t, x, y, *turn = deviation
+        sizes.append(math.hypot(t * speed / size, x / size, y / size, *(v / speed for v in turn)))
+    logs = np.diff(np.log(sizes))
+    assert found.logs == pytest.approx(logs)
+    assert found.exponents == pytest.approx([logs[: k + 1].mean() for k in range(37)])
+    blocks = [logs[5 + 2 * k : 7 + 2 * k].mean() for k in range(16)]
+    assert found.error == pytest.approx(np.std(blocks, ddof=1) / 4)
+    assert found.exponent == pytest.approx(logs.mean())
+    assert found.flight == pytest.approx((states[-1, 0] - states[0, 0]) / 37)
 
 
 @pytest.mark.parametrize(

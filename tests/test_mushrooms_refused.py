@@ -207,11 +207,30 @@ REFUSED: list[Any] = [
     (f"{ONE} --dask tcp://here:1", ["--dask", "needs --out"]),
     (f"{ONE} --block 8", ["--block", "needs --out"]),
     (f"{ONE} --phases 0.5", ["--phases", "needs --out"]),
+    (f"{ONE} --max-collisions 9", ["--max-collisions = 9", "needs --out"]),
+    *(
+        (f"check {files} {more}", [given, NOTHING, "questions and answers are in files"])
+        for files in ("--questions asked.jsonl", "--questions asked", "--answers ../good.csv")
+        for more, given in (
+            ("-- true", "COMMAND = ['true']"),
+            ("--groups step", "--groups = 'step'"),
+            ("--known-failures known.txt", "--known-failures = known.txt"),
+        )
+    ),
+    ("check --questions asked.jsonl --json r.json", ["r.json", NOTHING, "nothing is graded yet"]),
+    ("check --questions asked.txt", ["--questions = 'asked.txt', must end in .jsonl, or be a folder"]),
+    ("check --questions ..", ["--questions = '..' is not empty, must be a new folder"]),
+    ("check --questions asked.jsonl --level hard", ["level = 'hard'", "core, extended, stress"]),
+    ("check --answers absent.jsonl", ["answers 'absent.jsonl' cannot be read: No such file"]),
     ("scenes moving-cap --toml --json", ["--toml and --json"]),
     ("bench --workload all", ["--workload = 'all'", "needs --table"]),
     ("bench --table a.json --quick", ["--quick", "--table measures nothing"]),
+    ("bench --table a.json -- true", ["COMMAND = ['true']", "--table measures nothing"]),
     ("draw moving-cap --seed 1", ["--seed = 1", NOTHING, "the picture of the walls has no particles"]),
-    ("draw moving-cap --energy 1", ["--energy = 1.0", "no particles"]),
+    *(
+        (f"draw moving-cap --{name} 1", [f"--{name} = 1", NOTHING, "no particles"])
+        for name in ("energy", "collisions", "cycles")
+    ),
     ("draw moving-cap --trajectory --particles 3", ["--particles = 3", "--section, --map"]),
     ("draw moving-cap --export a.csv --particles 3", ["--particles = 3"]),
     ("draw moving-cap --map --phase 0.5", ["--phase = 0.5", "--section"]),
@@ -242,9 +261,27 @@ REFUSED: list[Any] = [
     (f"{AUDIT} ../good.csv --scene nowhere", ["nowhere"]),
     (f"{AUDIT} ../good.csv --scene frozen-mushroom", ["must be a mushroom that moves"]),
     (f"{AUDIT} ../good.csv --scene breathing-circle", ["must be a mushroom that moves"]),
-    (f"{AUDIT} ../good.csv --full", ["--full"]),
-    (f"{AUDIT} ../good.csv --only X2", ["--only"]),
-    ("audit --scene moving-cap", ["no --ensemble"]),
+    *(
+        (f"{AUDIT} ../good.csv {given}", [f"{said} {NOTHING}", "an --ensemble is audited"])
+        for given, said in (
+            ("--full", "--full"),
+            ("--only X2", "--only = 'X2'"),
+            ("--threads 2", "--threads = 2"),
+            ("--resume", "--resume"),
+            ("--commands", "--commands"),
+        )
+    ),
+    *(
+        (f"audit {given}", [f"{said} {NOTHING}", "there is no --ensemble"])
+        for given, said in (
+            ("--scene moving-cap", "--scene = 'moving-cap'"),
+            ("--backwards a.csv", "--backwards = a.csv"),
+            ("--energy 1", "--energy = 1.0"),
+            ("--energy-unit v2", "--energy-unit = 'v2'"),
+            ("--time-unit cycles", "--time-unit = 'cycles'"),
+            ("--particles 9", "--particles = 9"),
+        )
+    ),
     ("audit --ensemble ../good.csv", ["needs --scene"]),
     *((f"{AUDIT} ../ensemble.csv", [word], {"ensemble.csv": text}) for text, word in ENSEMBLES.items()),
     *(

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from mpmath import fp
-from support.artists import bars, line, words, xy
+from support.artists import bars, line, said, words, xy
 
 import conformance
 import fast
+import reference
 import theory
 from conformance import vectors
 from conformance.bench import record, scoreboard
@@ -62,11 +63,15 @@ def test_the_growth_of_errors_is_drawn_for_each_follower(figures):
     [axes] = figures[0].axes
     count = np.arange(1, grown.collisions + 1)
     for name, errors in grown.followers.items():
-        x, y = xy(line(axes, name))
+        one = line(axes, name)
+        x, y = xy(one)
         assert x.tolist() == count.tolist()
         kept = np.array(errors) > 0
         assert y[kept] == pytest.approx(np.array(errors)[kept])
         assert np.isnan(y[~kept]).all()  # no error has no place on a logarithmic axis
+        assert (
+            one.get_markevery() == grown.collisions // 16
+        )  # some marks, one at each collision of a short path
     assert xy(line(axes, "one ulp a step, grown"))[1] == pytest.approx(grown.bound)
     x, y = xy(line(axes, "Lyapunov slope"))
     assert np.diff(np.log10(y)) == pytest.approx(grown.rate)
@@ -74,6 +79,16 @@ def test_the_growth_of_errors_is_drawn_for_each_follower(figures):
     assert len(x) == 2 * (grown.collisions // 3)
     assert f"{grown.rate:.2f} decimals a collision" in words(figures[0])
     assert axes.get_yscale() == "log"
+    assert axes.get_ylim() == (1e-60, 10)
+    [names] = said(figures[0])
+    followers = " | ".join(re.sub(r"\d{2,}", "#", name) for name in grown.followers)
+    assert names == (
+        f" | collisions | error, relative to table and speed | {followers} | one ulp a step, grown"
+        " | Lyapunov slope: # decimals a collision"
+    )
+    brief = {name: errors[:9] for name, errors in grown.followers.items()}
+    bench_page.growth(msgspec.structs.replace(grown, collisions=9, followers=brief, bound=grown.bound[:9]))
+    assert {one.get_markevery() for one in figures[1].axes[0].lines if one.get_label() in brief} == {1}
 
 
 def test_the_headline_has_a_mark_for_each_solver_where_its_digits_and_time_are():
@@ -114,6 +129,12 @@ def test_the_headline_has_a_mark_for_each_solver_where_its_digits_and_time_are()
     assert xy(next(one for one in axes.lines if one.get_linestyle() == ":"))[0] == pytest.approx(
         bench_page.BINARY64
     )
+    assert (axes.get_xlim(), axes.get_ylim()) == ((0.65, KEPT.digits), (10, 1e8))
+    assert axes.get_xticks().tolist() == [2**k for k in range(8)]
+    workload = next(w for w in KEPT.workloads if w.name == bench_page.HEADLINE)
+    assert axes.get_title() == f"One core, {workload.name}: {workload.what}"
+    assert axes.get_xlabel() == "correct digits of an answer (mark: median; bar: to the worst)"
+    assert axes.get_ylabel() == "ns per collision"
     other = msgspec.structs.replace(KEPT, workloads=KEPT.workloads[:1])
     assert KEPT.workloads[0].name in bench_page.headline(other).axes[0].get_title()
 
@@ -320,7 +341,11 @@ def test_errors_and_speed_of_a_run_are_drawn(figures):
     assert speed.get_xlim()[0] < 250.0 < speed.get_xlim()[1]
     levels = {float(xy(one)[1][0]) for one in speed.lines if one.get_linestyle() == "--"}
     assert levels == {check_page.SHARP, check_page.FAIR}
-    assert "moving-cap" in speed.get_xlabel()
+    assert speed.get_xlim() == pytest.approx((250.0 / 30, 250.0 * 30))
+    assert errors.get_ylim() == (0.5, -0.5)
+    assert said(figures[0]) == [" | backward ulps of the answers that passed | "]
+    entries = "worst | median | class A ends | class B ends"
+    assert said(figures[1]) == [f" | ns per collision on moving-cap | backward ulps | {entries}"]
 
 
 def a_vector(kind: str) -> vectors.Vector:
@@ -389,7 +414,9 @@ def test_a_step_is_drawn_from_its_start_to_both_ends_with_its_direction(figures)
     ]
     ahead = [d[1] - d[0] for d in directions if len(d) == 2 and d[0].tolist() in ([0.5, 0.6], [0.5, 0.62])]
     assert sorted(np.sign(one).tolist() for one in ahead) == [[1.0, -1.0], [1.0, 1.0]]
-    assert whole.get_legend() is not None
+    assert said(figures[0]) == [
+        " | x [length] | y [length] | certified | given", "close to the end | x [length] | y [length]",
+    ]  # fmt: skip
 
 
 FALSE_STEPS = [  # of a step to x = 0.5, y = 0.6, vx = 1, vy = -1 at t = 1: what is given, and what is said
@@ -414,12 +441,12 @@ def test_the_title_of_a_false_step_names_what_is_off_most(figures, given, said):
 
 def test_at_time_0_and_at_rest_an_error_is_its_own_measure(figures):
     state, truth = State(-1.0, 0.1, 0.2, 0.0, 0.0), Horizon(0.0, 0.1, 0.2, 0.0, 0.0)
-    for given, said in (
+    for given, title in (
         ({"t": 0.1, "x": 0.11, "y": 0.2}, "t = 0.1, must be 0: off by 0.1"),
         ({"x": 0.11, "y": 0.2, "vy": 0.2}, "vy = 0.2, must be 0: off by 0.2"),
     ):
         check_page.draw_step(load("moving-cap"), state, truth, given, "step 1")
-        assert figures[-1].get_suptitle() == f"step 1: {said}"
+        assert figures[-1].get_suptitle() == f"step 1: {title}"
 
 
 def test_a_page_lists_failures_first_and_else_the_least_precise(monkeypatch):
@@ -449,6 +476,8 @@ def test_times_of_capture_of_an_ensemble_stand_under_theory(figures):
     shown, law = bars(axes, "ensemble"), bars(axes, "theory")
     assert shown.heights == pytest.approx(np.histogram(t_in, shown.edges, density=True)[0])
     assert (shown.edges[0], shown.edges[-1]) == (1.0, 3.0)
+    assert said(figures[0]) == [" | time of capture | density | ensemble | theory"]
+    assert axes.get_ylim()[0] == 0
     assert law.area == pytest.approx(float(np.ptp(found.capture_cdf(np.array([1.0, 3.0])))))
     for nothing in (None, np.full(9, np.nan), np.full(9, 2.0)):
         assert ensemble_command.capture_times(given._replace(t_in=nothing)) is None
@@ -568,3 +597,16 @@ def test_a_good_run_is_shown_without_objections(capsys, monkeypatch):
     text = shown_on_a_terminal(capsys, monkeypatch, a_run(*GOOD, *many))
     assert "... and 3 more: --json FILE has them all." in text
     assert text.count(": fail: wrong") == 20
+
+
+def test_the_width_of_a_proved_path_is_that_of_its_places_and_velocities():
+    """Places are measured by their distance from the middle, velocities by the speed: the worse counts."""
+    path = reference.trajectory(load("moving-cap"), State(0.2, 0.1, 0.3, 30.0, 5.0), 12, working=30)
+    for point, step in zip(bench._places(path), path.steps, strict=True):
+        _, x, y, vx, vy = step.after
+        size = math.hypot(float(x.centre()), float(y.centre()))
+        speed = math.hypot(float(vx.centre()), float(vy.centre()))
+        units = size, size, speed, speed
+        worst = max(float(c.width()) / unit for c, unit in zip(step.after[1:], units, strict=True))
+        assert float(point.width) == pytest.approx(worst, rel=1e-12)
+        assert (point.wall, point.x, point.vy) == (step.wall, x.centre(), vy.centre())

@@ -29,7 +29,7 @@ import theory
 from fast.kernel.follow import LANE_ROWS
 from mushrooms import progress
 from mushrooms.audit import ensemble_command
-from mushrooms.audit.ensemble_command import Options
+from mushrooms.audit.ensemble_command import Reading
 from mushrooms.folders import LOCK, locked
 from mushrooms.main import run
 from mushrooms.store import conduct
@@ -235,13 +235,17 @@ def test_a_block_is_reported_at_once_and_two_are_in_memory(tmp_path, monkeypatch
 
 def test_progress_tells_the_time_left(capsys, monkeypatch):
     """From the first call on: what was there before took no time."""
-    now = iter(range(0, 10**6, 60))
+    now = iter(range(7000, 10**6, 60))  # a clock begins anywhere
     monkeypatch.setattr(progress, "CLOCK", lambda: float(next(now)))
     with progress.progress_bar() as bar:
         watch = progress.Watch(bar, "run", "particles")
-        for n_done in (500, 1000, 1500):
+        for n_done in (500, 1000, 1500, 1900):
             watch.update(n_done, 2000)
-    told = "run: 1,000 of 2,000 particles, 2 minutes left\nrun: 1,500 of 2,000 particles, 60 seconds left\n"
+    told = (
+        "run: 1,000 of 2,000 particles, 2 minutes left\n"
+        "run: 1,500 of 2,000 particles, 60 seconds left\n"
+        "run: 1,900 of 2,000 particles, 13 seconds left\n"
+    )
     assert capsys.readouterr().err == told
 
 
@@ -428,7 +432,7 @@ def test_exports_have_every_bit(command_line, stored, tmp_path):
         for found in (rows, table):
             np.testing.assert_array_equal(np.asarray(found[name]), column)
     for path in (tmp_path / "run.csv", tmp_path / "run.parquet", stored):  # and the audit reads them
-        given, _ = ensemble_command.read(path, load("moving-cap"), Options(ENERGY, "v2/2", "scene", None))
+        given, _ = ensemble_command.read(path, load("moving-cap"), Reading(ENERGY, "v2/2", "scene", None))
         takes_part = np.isfinite(ensemble.energy)
         np.testing.assert_array_equal(given.s, np.log(ensemble.energy[takes_part] / ENERGY))
         np.testing.assert_array_equal(given.t_in, ensemble.t_in[takes_part, 0, 0])

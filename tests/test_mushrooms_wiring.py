@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import zarr
 from pyarrow import parquet
+from support.options import draw_options
 from support.refusals import assert_refused, one_line
 
 import fast
@@ -129,7 +130,7 @@ def test_a_stored_run_is_the_one_at_once(reopened):
 def test_an_export_has_every_result_and_nothing_internal(reopened, tmp_path, capsys):
     files = [tmp_path / f"a.{kind}" for kind in ("csv", "parquet", "npz")]
     for file in files:
-        exports.export_run(reopened.folder, file)
+        exports.export_run(exports.ExportOptions(run=reopened.folder, to=file))
     assert capsys.readouterr().out.split() == list(map(str, files))
     wanted = [
         "particle", *(f"cycle_energies_{k}" for k in (1, 2)), "t", "x", "y", "vx", "vy",
@@ -373,7 +374,7 @@ def test_each_kind_of_picture_is_drawn_by_its_function(command_line, tmp_path, d
 def test_growth_is_of_those_that_take_part(monkeypatch):
     asked = []
     monkeypatch.setattr(energies, "growth", lambda *given: asked.append(given))
-    options = draw.DrawOptions(50.0, None, 2, 30, 4, None)
+    options = draw_options(energy=50.0, cycles=2, particles=30, seed=4)
     island = scenes.Mushroom(r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (0.2,)), name="island")
     draw._growth(island, options)
     [(scene, energy, gains, n)] = asked
@@ -390,7 +391,7 @@ def test_exponents_tell_how_far_they_are(monkeypatch):
     monkeypatch.setattr(
         pictures, "exponents", lambda found, report: seen.append(len(found)) or report(7) or "it"
     )
-    assert draw._figure("lyapunov", STEM, draw.DrawOptions(*[None] * 6)) == "it"
+    assert draw._figure("lyapunov", STEM, draw_options()) == "it"
     assert seen == [2]
 
 
@@ -480,6 +481,40 @@ def test_summaries_are_of_what_was_followed():
         RunSpec(STEM, 40.0, 3, 1), tally._replace(met=0, collisions=0), 2.0, list, "d"
     )
     assert (nothing["collision_time"], nothing["ns_per_collision"]) == (None, 2e9)
+
+
+PULLS = [  # found, predicted, standard error, possible error of theory; the difference in both
+    (2.0, 1.0, 0.3, 0.4, 2.0), (1.0, 2.0, 0.3, 0.4, -2.0), (1.0, 1.0, 0.3, 0.4, 0.0),
+    (2.0, 1.0, 0.5, 0.0, 2.0), (2.0, 1.0, 0.0, 0.5, 2.0), (2.0, 1.0, 0.0, 0.0, None),
+    (None, 1.0, 0.3, 0.4, None), (2.0, 1.0, None, 0.4, None), (2.0, 1.0, 0.3, None, None),
+    (1.0, 0.0, 1.5, 0.0, 0.667),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("found", "wanted", "error", "left_out", "pull"), PULLS, ids=range(len(PULLS)))
+def test_a_difference_is_told_in_the_errors_that_there_are(found, wanted, error, left_out, pull):
+    """None where there is none, or where one is not known; rounded to three decimals."""
+    assert summary._pull(found, wanted, error, left_out) == pull
+
+
+@pytest.mark.parametrize("n_cycles", [1, 3])
+def test_a_prediction_of_a_run_goes_from_its_energy_towards_the_limit(n_cycles):
+    """A cycle adds what finite energy does as E^(-1/2), which falls by the mean of exp(-s / 2) each time."""
+    scene, energy = load("moving-cap"), 1e4
+    limit, here = theory.predict(scene, 10), theory.at_energy(scene, energy)
+    found = summary.predicted(RunSpec(scene, energy, n_cycles, 0))
+    falls = here.mean_of_exp(-0.5)
+    part = 1.0 if n_cycles == 1 else (1 + falls + falls**2) / 3
+    assert 0.8 < falls < 0.99
+    for name, at_infinity, at_energy in (
+        ("m1", limit.m1, here.mean_s), ("p_nc", limit.p_nc, here.p_nc),
+        ("variance", limit.sd**2, here.variance_s),
+    ):  # fmt: skip
+        expected = part * at_energy + (1 - part) * float(at_infinity)
+        assert abs(at_energy - float(at_infinity)) > 1e-4
+        assert getattr(found, name) == pytest.approx(expected, rel=1e-8)
+    assert found.m1_error == pytest.approx(part * here.theory_error.mean_s)
+    assert found.p_nc_error == pytest.approx(part * here.theory_error.p_nc)
 
 
 def test_predictions_at_an_energy_are_rounded_to_what_they_are_worth():

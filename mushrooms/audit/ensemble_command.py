@@ -26,6 +26,7 @@ from mushrooms.audit.ensemble_checks import (
     likely_causes,
     reversal,
 )
+from mushrooms.audit.options import AuditOptions
 from mushrooms.audit.page import expected_text, figures_text, power_text, pull, to_json
 from mushrooms.audit.runs import BoolArray, FloatArray
 from mushrooms.figures import energies
@@ -49,7 +50,8 @@ FLAGS = {"true": "1", "false": "0", "t": "1", "f": "0", "yes": "1", "no": "0"}
 N_BINS = 50
 SIGNS = {True: ("✓", "good"), False: ("✗", "bad"), None: ("?", "open")}
 WORDS = {True: "holds", False: "FAILS", None: "open"}
-ENERGIES, GAIN = "E1", "s"
+ENERGIES = "E1"
+GAIN = "s"
 # What a column may be called; of several minima of nu or capture intervals the earliest counts.
 NAMES = {
     "E0": r"E_?0|e0|energy_?0",
@@ -63,8 +65,8 @@ NAMES = {
 }
 
 
-class Options(NamedTuple):
-    """What the command line says of an ensemble beside its file and its scene."""
+class Reading(NamedTuple):
+    """How the file of an ensemble is read: the energy of its starts, its units, and how many were started."""
 
     energy: float | None
     energy_unit: str
@@ -87,33 +89,37 @@ class EnsembleAudit(NamedTuple):
         return "refuted" if False in held else "indeterminate" if None in held else "confirmed"
 
 
-def audit_ensemble(
-    path: Path, scene_name: str | None, reversed_path: Path | None, options: Options, out: Path, as_json: bool
-) -> int:
+def audit_ensemble(path: Path, options: AuditOptions) -> int:
     """Audit an ensemble, write report.json, report.txt and report.html; return the exit code."""
-    if scene_name is None:
+    if options.scene is None:
         raise BadInput("--ensemble needs --scene, the scene that was simulated")
-    found = scene_named(scene_name)
+    found = scene_named(options.scene)
     if not isinstance(found, Mushroom) or not found.period:
-        raise BadInput(f"--scene = {scene_name!r}, must be a mushroom that moves: theory has no other")
-    if options.energy_unit not in UNITS:
-        raise BadInput(f"--energy-unit = {options.energy_unit!r}, must be one of {', '.join(UNITS)}")
-    if options.time_unit not in (None, *TIMES):
-        raise BadInput(f"--time-unit = {options.time_unit!r}, must be one of {', '.join(TIMES)}")
-    with writable_folder(out) as folder:
-        result = examine(path, found, reversed_path, options)
-        data = to_data(result, path, scene_name)
-        write_report(folder, to_json(data), to_text(data), to_html(data, result.given), as_json)
+        raise BadInput(f"--scene = {options.scene!r}, must be a mushroom that moves: theory has no other")
+    reading = reading_of(options)
+    if reading.energy_unit not in UNITS:
+        raise BadInput(f"--energy-unit = {reading.energy_unit!r}, must be one of {', '.join(UNITS)}")
+    if reading.time_unit not in (None, *TIMES):
+        raise BadInput(f"--time-unit = {reading.time_unit!r}, must be one of {', '.join(TIMES)}")
+    with writable_folder(options.out) as folder:
+        result = examine(path, found, options.backwards, reading)
+        data = to_data(result, path, options.scene)
+        write_report(folder, to_json(data), to_text(data), to_html(data, result.given), options.as_json)
     return 0 if result.verdict == "confirmed" else 1
 
 
-def examine(path: Path, scene: Mushroom, reversed_path: Path | None, options: Options) -> EnsembleAudit:
+def reading_of(options: AuditOptions) -> Reading:
+    """Return how the files of an audit are read."""
+    return Reading(options.energy, options.energy_unit or "v2/2", options.time_unit, options.particles)
+
+
+def examine(path: Path, scene: Mushroom, reversed_path: Path | None, reading: Reading) -> EnsembleAudit:
     """Read an ensemble and check it."""
-    given, notes = read(path, scene, options)
+    given, notes = read(path, scene, reading)
     theirs = expected(scene, given.energy)
     found = checks(given, theirs)
     if reversed_path is not None:
-        other, _ = read(reversed_path, scene, options._replace(particles=None))
+        other, _ = read(reversed_path, scene, reading._replace(particles=None))
         found.append(reversal(given, other, theirs))
     if isinstance(theirs, HighEnergies):
         notes.append(
@@ -124,38 +130,46 @@ def examine(path: Path, scene: Mushroom, reversed_path: Path | None, options: Op
     return EnsembleAudit(given, found, likely_causes(given, theirs, found), notes)
 
 
-def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, list[str]]:
+def read(path: Path, scene: Mushroom, reading: Reading) -> tuple[GivenEnsemble, list[str]]:
     """Return an ensemble in the scene's units, and what was taken for granted."""
-    given, n_other = read_table(path, scene, options.energy, UNITS[options.energy_unit])
-    form = options.energy_unit.replace("v2", "v²")
+    given, n_other = read_table(path, scene, reading.energy, UNITS[reading.energy_unit])
+    form = reading.energy_unit.replace("v2", "v²")
     notes = [f"energies are taken as {form}, lengths in the scene's unit: E0 = {given.energy:g} as v²/2"]
     if n_other:
         notes.append(f"{n_other:,} rows of another E0 are left out")
     if given.t_in is not None and np.isfinite(given.t_in).any():
-        unit, how = (options.time_unit, "as said") if options.time_unit else (_unit(given), "inferred")
+        unit = reading.time_unit or _unit(given)
         size = scene.period if unit == "cycles" else 1.0
         t_out = None if given.t_out is None else given.t_out * size
         given = given._replace(t_in=given.t_in * size, t_out=t_out)
         told = "as parts of a cycle" if unit == "cycles" else "in the unit of the scene"
-        notes.append(f"times are taken {told}, {how}")
+        notes.append(f"times are taken {told}, {'as said' if reading.time_unit else 'inferred'}")
     if given.captured is None and given.t_in is not None:
         given = given._replace(captured=np.isfinite(given.t_in))
         notes.append("captured are those with a t_in")
-    if options.particles is not None:
-        n_rows = len(given.s) + given.n_lost
-        if options.particles < n_rows:
-            raise BadInput(f"--particles = {options.particles}, must be at least the {n_rows} rows")
-        given = given._replace(n_lost=options.particles - len(given.s))
+    if reading.particles is not None:
+        given = _with_particles(given, reading.particles)
     return given, notes
+
+
+def _with_particles(given: GivenEnsemble, n_particles: int) -> GivenEnsemble:
+    """Count as lost the particles that were started and have no row."""
+    n_rows = len(given.s) + given.n_lost
+    if n_particles < n_rows:
+        raise BadInput(f"--particles = {n_particles}, must be at least the {n_rows} rows")
+    return given._replace(n_lost=n_particles - len(given.s))
 
 
 def _unit(given: GivenEnsemble) -> str:
     """Return the unit in which times are in the cycle; of two that in which they are nearer to theory's."""
-    begin, span = cycle_start(given.scene), given.scene.period
+    begin = cycle_start(given.scene)
+    span = given.scene.period
     known = np.empty(0) if given.t_in is None else given.t_in[np.isfinite(given.t_in)]
-    low, high = float(known.min()), float(known.max())
+    low = float(known.min())
+    high = float(known.max())
     sizes = dict(zip(TIMES, (1.0, span), strict=True))
-    least, most = begin - TOUCH * span, begin + (1 + TOUCH) * span
+    least = begin - TOUCH * span
+    most = begin + (1 + TOUCH) * span
     fitting = [unit for unit, size in sizes.items() if least <= low * size and high * size <= most]
     if not fitting:
         raise BadInput(
@@ -249,38 +263,26 @@ def read_table(path: Path, scene: Mushroom, energy: float | None, unit: float) -
     Raises:
         BadInput: in one line, naming the column or the place.
     """
-    label, n_lost, n_other, is_binary32 = f"--ensemble {str(path)!r}", 0, 0, True
+    label = f"--ensemble {str(path)!r}"
+    n_lost = 0
+    n_other = 0
+    is_binary32 = True
     kept: dict[str, list[FloatArray]] = {"sums": []}
     one = energy
     for part in _parts(path, label):
-        start = np.full(len(next(iter(part.values()))), energy, float)
-        if "E0" in part:
-            start = part.pop("E0")
-            one = float(start[0]) if one is None else one
-            chosen = _is_start(label, start, one, is_asked=energy is not None)
-            n_other += int(np.sum(~chosen))
-            start, part = start[chosen], {name: column[chosen] for name, column in part.items()}
-        elif energy is None:
-            raise BadInput(f"{label}: column 'E0' is missing, and so is --energy, v^2/2 of every start")
+        one = _first_energy(label, part) if one is None else one
+        start, columns = _split_start(label, part, one, is_asked=energy is not None)
+        n_other += len(next(iter(part.values()))) - len(start)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            after = part.pop(ENERGIES, np.empty((0, 1)))
-            sums = part.pop(GAIN)[:, None] if GAIN in part else np.log(after / start[:, None])
+            after = columns.pop(ENERGIES, np.empty((0, 1)))
+            sums = columns.pop(GAIN)[:, None] if GAIN in columns else np.log(after / start[:, None])
             is_binary32 &= bool(after.size) and not np.any(np.abs(after - after.astype(np.float32)) > 0)
         followed = np.isfinite(sums).all(axis=1)
         n_lost += int(np.sum(~followed))
-        for name, column in {**part, "sums": sums}.items():
+        for name, column in {**columns, "sums": sums}.items():
             kept.setdefault(name, []).append(column[followed])
-    whole: dict[str, Any] = {
-        name: np.concatenate(kept.pop(name) or [np.empty((0, 1))]) for name in list(kept)
-    }
+    whole = _joined(label, kept)
     sums = whole.pop("sums")
-    if len(sums) < 2:
-        raise BadInput(f"{label}: {len(sums)} energies, must be 2 or more")
-    if "captured" in whole:
-        odd = whole["captured"][~np.isin(whole["captured"], (0, 1))]
-        if len(odd):
-            raise BadInput(f"{label}: captured = {odd[0]}, must be 0 or 1")
-        whole["captured"] = whole["captured"].astype(bool)
     assert one is not None
     given = GivenEnsemble(
         scene,
@@ -292,6 +294,39 @@ def read_table(path: Path, scene: Mushroom, energy: float | None, unit: float) -
         **whole,
     )
     return given, n_other
+
+
+def _first_energy(label: str, part: dict[str, FloatArray]) -> float:
+    """Return the E0 of the first row, where no energy was asked for."""
+    if "E0" not in part:
+        raise BadInput(f"{label}: column 'E0' is missing, and so is --energy, v^2/2 of every start")
+    return float(part["E0"][0])
+
+
+def _split_start(
+    label: str, part: dict[str, FloatArray], energy: float, *, is_asked: bool
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Return the initial energies, and the other columns, of the rows that have this E0."""
+    if "E0" not in part:
+        return np.full(len(next(iter(part.values()))), energy, float), part
+    chosen = _is_start(label, part["E0"], energy, is_asked=is_asked)
+    columns = {name: column[chosen] for name, column in part.items()}
+    return columns.pop("E0"), columns
+
+
+def _joined(label: str, kept: dict[str, list[FloatArray]]) -> dict[str, Any]:
+    """Join the parts of each column, which are given up one by one; refuse what no ensemble has."""
+    whole: dict[str, Any] = {
+        name: np.concatenate(kept.pop(name) or [np.empty((0, 1))]) for name in list(kept)
+    }
+    if len(whole["sums"]) < 2:
+        raise BadInput(f"{label}: {len(whole['sums'])} energies, must be 2 or more")
+    if "captured" in whole:
+        odd = whole["captured"][~np.isin(whole["captured"], (0, 1))]
+        if len(odd):
+            raise BadInput(f"{label}: captured = {odd[0]}, must be 0 or 1")
+        whole["captured"] = whole["captured"].astype(bool)
+    return whole
 
 
 def _is_start(label: str, start: FloatArray, energy: float, *, is_asked: bool) -> BoolArray:
@@ -360,7 +395,8 @@ def _csv(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
     """
     check_digest(path, label)
     header = read_names(path, label)
-    wanted, n_done = _select_columns(label, header), 0
+    wanted = _select_columns(label, header)
+    n_done = 0
     try:
         from pyarrow import csv as arrow
 
@@ -373,7 +409,7 @@ def _csv(path: Path, label: str) -> Iterator[dict[str, FloatArray]]:
             n_done += len(batch)
     except (ImportError, ValueError, KeyError):  # the cells tell what is wrong, and where
         rows = islice(read_rows(path, label, wanted), n_done, None)
-        while some := list(islice(rows, FEW)):
+        for some in iter(lambda: list(islice(rows, FEW)), []):
             yield {name: np.array([_cell(place, name, row[name]) for place, row in some]) for name in wanted}
 
 

@@ -26,12 +26,12 @@ from mushrooms.audit.claim import (
     verdict_of,
 )
 from mushrooms.audit.claims import all_claims
-from mushrooms.audit.runs import RUNS, Progress, Sample, Simulate, Size, draw
+from mushrooms.audit.runs import RUNS, Progress, Sample, Simulate, Simulation, Size, draw
 from scene.files.writer import sealed, unsealed, write_file
 from scene.refusal import check_seed
 
 # Modules of this folder that decide nothing: import-linter holds that none that decides imports them.
-SHOWING = ("command.py", "ensemble_command.py", "figures.py", "page.py")
+SHOWING = ("command.py", "ensemble_command.py", "figures.py", "options.py", "page.py")
 
 
 class AuditSettings(NamedTuple):
@@ -113,16 +113,15 @@ def conduct(
     known = {claim.id: _kept(claim, settings) for claim in claims}
     found = {name: from_data(data["finding"]) for name, data in known.items() if data.get("code") == code()}
     samples: dict[str, Sample] = {}
-    for name in dict.fromkeys(run for claim in claims for run in claim.runs):
-        if RUNS[name].n_particles(settings.size):
-            samples[name] = draw(
-                simulate_run(name) if simulate_run else steppers.simulate,
-                RUNS[name],
-                size=settings.size,
-                seed=settings.seed,
-                threads=settings.threads,
-                progress=partial(progress, name, RUNS[name].n_particles(settings.size)),
-            )
+    for run in needed(claims, settings.size):
+        samples[run.name] = draw(
+            simulate_run(run.name) if simulate_run else steppers.simulate,
+            run,
+            size=settings.size,
+            seed=settings.seed,
+            threads=settings.threads,
+            progress=partial(progress, run.name, run.n_particles(settings.size)),
+        )
     evidence = ClaimEvidence(
         samples,
         steppers,
@@ -137,6 +136,12 @@ def conduct(
         _save(claim, found[claim.id], settings)
     findings = [found[claim.id] for claim in claims]
     return AuditResult(settings, tuple(claims), findings, samples, time.perf_counter() - begin)
+
+
+def needed(claims: Sequence[Claim], size: Size) -> list[Simulation]:
+    """Return the runs of this size that claims rest on, in the order in which they are made."""
+    names = dict.fromkeys(name for claim in claims for name in claim.runs)
+    return [RUNS[name] for name in names if RUNS[name].n_particles(size)]
 
 
 def kept(settings: AuditSettings) -> set[str]:

@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from mpmath import fp
 
 from fast.ensemble import follow_many, least_collisions, only_stop
 from fast.kernel import records
@@ -41,8 +40,6 @@ from fast.validation import (  # isort: skip
     MAX_STEPS, check_end, check_energy, check_states, check_threads,
 )  # fmt: skip
 from scene import InvalidState, Mushroom, Outcome, Rejected, Scene, State, Undecided, Wall, check_scene
-from scene.geometry import half_width
-from scene.laws import values
 from scene.refusal import BadInput, check_count, check_number, shown
 
 NAMES = np.array([WALL_NAMES[code] for code in range(len(WALL_NAMES))], dtype=object)
@@ -284,7 +281,8 @@ def sin_phi(scene: Scene, states: FloatArray, hits: npt.NDArray[np.int64]) -> tu
         (m,) sin of the angle to the normal before the bounce, clockwise > 0 (Eq:sinphi); (m,) nu.
     """
     before, (t, x, y, vx, vy) = states[hits], states[hits + 1].T
-    r, w = values(scene.r, t), half_width(fp, scene, t)  # type: ignore[union-attr]  # no stem has an arc
+    r = scene.laws["r"].values(t)
+    w = scene.width.values(t)
     # The speed of the flight that ends here; the bounce keeps the angular momentum about the centre.
     sine: FloatArray = (y * vx - x * vy) / (np.hypot(before[:, 3], before[:, 4]) * r)
     return sine, w / r

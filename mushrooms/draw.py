@@ -21,10 +21,8 @@ from mushrooms.store.run import is_run, open_run
 from scene import BadInput, Scene, Stem
 from scene.files.tables import SUFFIXES
 from scene.files.writer import write_file
-from scene.laws import bounds
 from scene.named import is_scene, scene_named
 from scene.refusal import refuse_unheeded
-from scene.tables import laws
 
 
 class Usual(NamedTuple):
@@ -180,9 +178,7 @@ def _paths(scene: Scene, out: Path, kinds: list[str]) -> dict[str, Path]:
     Raises:
         BadInput: one of them cannot be drawn, or not written, or does not move and is to be a .gif.
     """
-    found = {
-        f"scene.{name}": bounds(law).highest for name, law in laws(scene).items() if name != "slope"
-    }
+    found = {f"scene.{name}": law.bounds().highest for name, law in scene.laws.items() if name != "slope"}
     found |= {"period": scene.period} if scene.period else {}
     for name, size in found.items():  # squares and sums of them are in a figure
         if not LEAST_DRAWN <= size <= 1 / LEAST_DRAWN:

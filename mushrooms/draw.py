@@ -178,7 +178,9 @@ def _paths(scene: Scene, out: Path, kinds: list[str]) -> dict[str, Path]:
     Raises:
         BadInput: one of them cannot be drawn, or not written, or does not move and is to be a .gif.
     """
-    found = {f"scene.{name}": law.bounds().highest for name, law in scene.laws.items() if name != "slope"}
+    found = {
+        f"scene.{name}": law.bounds().highest for name, law in scene.laws.items() if name != "slope"
+    }
     found |= {"period": scene.period} if scene.period else {}
     for name, size in found.items():  # squares and sums of them are in a figure
         if not LEAST_DRAWN <= size <= 1 / LEAST_DRAWN:

@@ -30,7 +30,9 @@ COMMANDS = (
     "draw mine.toml --trajectory --seed 1 --out path.gif --export path.csv",
     "ask near-corner/3 -- {python} -m conformance.plain",
     "audit --only N5 --out report",
+    "check --questions asked.jsonl --seed 1",
 )
+GRADED = "check --questions asked.jsonl --answers answers.jsonl"
 TYPED = (
     "import importlib.resources as r, sys\n"
     "for name in ('scene', 'reference', 'fast', 'theory', 'conformance', 'mushrooms'):\n"
@@ -64,6 +66,12 @@ def main(folder: Path) -> None:
                 if os.name == "nt" and command.startswith("ask"):
                     continue  # it signals groups of processes
                 run(str(programs / "mushrooms"), *command.format(python=python).split())
+            # A program that speaks the protocol answers a file of questions, which is then graded.
+            asked, answers = Path(scratch) / "asked.jsonl", Path(scratch) / "answers.jsonl"
+            with asked.open("rb") as source, answers.open("wb") as target:
+                stepper = [python, "-m", "fast"]
+                subprocess.run(stepper, cwd=scratch, env=environment, stdin=source, stdout=target, check=True)
+            run(str(programs / "mushrooms"), *GRADED.split())
 
 
 if __name__ == "__main__":

@@ -53,7 +53,7 @@ from scene import (
     transforms,
 )
 from scene.geometry import table_at
-from scene.laws import bounds, is_constant
+from scene.laws import bounds, is_constant, times_power
 from scene.precision import decimals
 from scene.refusal import shown
 from scene.states import Stepper
@@ -109,7 +109,7 @@ def check_scaling(
 
     Exact to the bit if all numbers, before and after, are 0 or between 2^-400 and 2^400. See `check_mirror`.
     """
-    unit, size, speed = (transforms.times_power(1.0, exponent) for exponent in (time, length, length - time))
+    unit, size, speed = (times_power(1.0, exponent) for exponent in (time, length, length - time))
     answer = ask(stepper, scene, state, t_end)
     inputs = [t_end, state.t, state.x, state.y, state.vx, state.vy, *(numbers(answer, state) or ())]
     if any(part and not LEAST < abs(part) * f < MOST for part in inputs for f in (1.0, unit, size, speed)):

@@ -19,7 +19,7 @@ from conformance.cases.draw import Draw, Question, Unfit
 from conformance.cases.scenes import Clock, any_law, any_scene, start, when
 from conformance.cases.table import FAMILIES
 from conformance.vectors import question
-from scene import BadInput, Horizon, Law, Scene, State, from_data
+from scene import BadInput, GivenLaw, Horizon, Scene, State, from_data
 from scene.transforms import scaled
 
 KINDS = ("constant", "fourier", "bang-bang", "mixed")
@@ -50,7 +50,7 @@ def _integers(n: int) -> st.SearchStrategy[int]:
 
 
 @st.composite
-def laws(draw: st.DrawFn, low: float = 0.5, high: float = 2.0, clock: Clock | None = None) -> Law:
+def laws(draw: st.DrawFn, low: float = 0.5, high: float = 2.0, clock: Clock | None = None) -> GivenLaw:
     """Draw a law that stays within [low, high] at all times.
 
     Args:

@@ -51,7 +51,7 @@ autodoc_type_aliases = {
     name: name
     for name in (
         *("ArrayLike", "BoolArray", "FloatArray", "Floats", "Gains", "IntArray"),
-        *("Flowing", "Follow", "Law", "Outcome", "Question", "Scene", "Stepper", "Wall"),
+        *("Flowing", "Follow", "GivenLaw", "Outcome", "Question", "Scene", "Stepper", "Wall"),
     )
 }
 copybutton_prompt_text = r">>> |\.\.\. |\$ "

@@ -15,27 +15,24 @@ the numbers that the kernels read.
 import math
 import sys
 from copy import copy
-from fractions import Fraction
-from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from fast.kernel import records
-from fast.kernel.arithmetic import HALF_PI, split
 from fast.kernel.fates import Fate
+from fast.kernel.laws import omega_of, row_of
 from fast.kernel.single import LARGEST, LENGTH, TIME
 
 from fast.kernel.records import (  # isort: skip
-    BANG_BANG, CONSTANT, FOURIER, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, BoolArray, Compiled,
+    FOURIER, KIND, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, BoolArray, Compiled,
     FloatArray, IntArray,
 )  # fmt: skip
-from scene import BadInput, BangBang, Cap, Fourier, InvalidScene, InvalidState, Law, Scene, State
-from scene.laws import Bounds, bounds, is_constant, size_bounds
-from scene.tables import laws, period, width_factors
-from scene.transforms import scaled_law, times_power
+from scene import BadInput, InvalidScene, InvalidState, Law, Scene, State
+from scene.laws import Constant, times_power
 
+ABSENT = Constant(0.0)  # a law that a table does not have
 TABLES = {"Cap": int(records.CAP), "Stem": int(records.STEM), "Mushroom": int(records.MUSHROOM)}
 
 
@@ -57,60 +54,19 @@ def compile_scene(scene: Scene) -> Compiled:
 
 
 def _laid_out(scene: Scene) -> Compiled:
-    given = laws(scene)
-    r, h, slope = (given.get(name, 0.0) for name in ("r", "h", "slope"))
-    factors = (0.0,) if isinstance(scene, Cap) else width_factors(scene)
-    rows = [_row(law) for law in (r, factors[0], h, slope)]
-    moving = [law for law in (r, *factors, h, slope) if isinstance(law, Fourier) and not is_constant(law)]
+    r, h, slope = (scene.laws.get(name, ABSENT) for name in ("r", "h", "slope"))
+    width = scene.width
+    rows = [row_of(law) for law in (r, width.factors[0], h, slope)]
     table = np.zeros((len(rows) + 1, max(OMEGA_LOW + 1, *(len(row) for row in rows))))
     for i, row in enumerate(rows):
         table[i, : len(row)] = row
-    for law in moving:
-        table[SHARED, OMEGA], table[SHARED, OMEGA_LOW] = _omega(law)
-        table[SHARED, N_HARMONICS] = max(table[SHARED, N_HARMONICS], len(law.cos), len(law.sin))
-    limits = np.array([size_bounds(r), _product_bounds(factors), size_bounds(h), bounds(slope)])
-    return Compiled(TABLES[type(scene).__name__], len(factors) == 2, table, limits)
-
-
-def _omega(law: Fourier) -> tuple[float, float]:
-    """Return a law's frequency as a sum of two floats: exact if given, else 2 pi / period to 2^-106."""
-    if law.omega is not None:
-        return law.omega, 0.0
-    assert law.period is not None
-    high, low = split(4 * HALF_PI / Fraction(law.period))
-    return high, low
-
-
-def _row(law: Law) -> list[float]:
-    if isinstance(law, Fourier) and not is_constant(law):
-        harmonics = list(zip_longest(law.cos, law.sin, fillvalue=0.0))
-        cos, sin = zip(*harmonics, strict=True)
-        return [FOURIER, law.mean, _omega(law)[0], len(harmonics), *cos, *sin]
-    if isinstance(law, BangBang) and not is_constant(law):
-        times, values = zip(*law.knots, strict=True)
-        accelerations = [
-            4 * (Fraction(v1) - Fraction(v0)) / (Fraction(t1) - Fraction(t0)) ** 2
-            for (t0, v0), (t1, v1) in pairwise(law.knots)
-        ] + [Fraction(0)]  # one for every knot keeps the columns simple
-        highs, lows = zip(*map(split, accelerations), strict=True)
-        period, period_low = split(Fraction(times[-1]) - Fraction(times[0]))
-        return [BANG_BANG, 0.0, period, len(times), period_low, *times, *values, *highs, *lows]
-    constant = law if isinstance(law, float) else law.mean if isinstance(law, Fourier) else law.knots[0][1]
-    return [CONSTANT, constant, 0.0, 0.0]
-
-
-def _product_bounds(factors: tuple[Law, ...]) -> Bounds:
-    if len(factors) == 1:
-        return size_bounds(factors[0])
-    nu, r = size_bounds(factors[0]), size_bounds(factors[1])
-    # Leibniz, rounded outward by a few units in the last place; nu and r are positive.
-    grow = 1.0 + 2.0**-50
-    return Bounds(
-        nu.lowest * r.lowest / grow,
-        nu.highest * r.highest * grow,
-        (nu.slope * r.highest + nu.highest * r.slope) * grow,
-        (nu.curvature * r.highest + 2 * nu.slope * r.slope + nu.highest * r.curvature) * grow,
-    )
+    waves = [row for row in rows if row[KIND] == FOURIER]
+    if waves:
+        assert scene.cycle is not None
+        table[SHARED, OMEGA], table[SHARED, OMEGA_LOW] = omega_of(scene.cycle)
+        table[SHARED, N_HARMONICS] = max(row[N_HARMONICS] for row in waves)
+    limits = np.array([r.size_bounds(), width.size_bounds(), h.size_bounds(), slope.bounds()])
+    return Compiled(TABLES[type(scene).__name__], len(width.factors) == 2, table, limits)
 
 
 class LateTime(InvalidState):
@@ -170,15 +126,15 @@ class Units(NamedTuple):
 
 def units_of(scene: Scene) -> tuple[int, int | None]:
     """Return the exponents of a scene's units of length and time; None for the time of a static table."""
-    sizes = [level(law) for name, law in laws(scene).items() if name in ("r", "w", "h")]
+    sizes = [law.level for name, law in scene.laws.items() if name in ("r", "w", "h")]
     length = exponent(max(sizes)) - LENGTH
-    shared = period(scene)
-    if shared is None:
+    cycle = scene.cycle
+    if cycle is None:
         return length, None
-    if shared.omega is not None:
-        return length, -exponent(shared.omega) - TIME
-    assert shared.length is not None  # a float, as the scene has found
-    return length, exponent(float(shared.length)) - TIME
+    if cycle.omega is not None:
+        return length, -exponent(cycle.omega) - TIME
+    assert cycle.length is not None  # a float, as the scene has found
+    return length, exponent(float(cycle.length)) - TIME
 
 
 def in_units(scene: Scene, length: int, time: int) -> Scene:
@@ -188,25 +144,15 @@ def in_units(scene: Scene, length: int, time: int) -> Scene:
         BadInput: a number of the scene loses bits beside the table's size and period.
     """
     found = copy(scene)  # which is valid, and so is the same table in other units: one proof serves both
-    for name, law in laws(scene).items():
+    for name, law in scene.laws.items():
         changed = _in_units(f"scene.{name}", law, 0 if name in ("nu", "slope") else length, time)
-        msgspec.structs.force_setattr(found, name, changed)
+        msgspec.structs.force_setattr(found, name, changed.as_field())
     return found
 
 
 def exponent(size: float) -> int:
     """Return e with 2^e <= size < 2^(e + 1), for size > 0."""
     return math.frexp(size)[1] - 1
-
-
-def level(law: Law) -> float:
-    """Return a number within a factor of a few dozen of a positive law's largest value.
-
-    It is one of the law's own numbers, so that it scales as the law does, to the bit.
-    """
-    if isinstance(law, BangBang):
-        return max(knot[1] for knot in law.knots)
-    return law.mean if isinstance(law, Fourier) else law
 
 
 def inward(field: str, number: float, exponent: int) -> float:
@@ -249,12 +195,12 @@ def _in_units(field: str, law: Law, length: int, time: int) -> Law:
         BadInput: a number would lose bits, or be too large.
     """
     try:
-        found = scaled_law(law, -length, -time)
-        is_kept = scaled_law(found, length, time) == law
+        found = law.scaled(-length, -time)
+        is_kept = found.scaled(length, time) == law
     except InvalidScene:  # of a law none of whose numbers may be infinite, or a frequency 0
         is_kept = False
     if not is_kept:
-        given = msgspec.json.encode(law).decode()
+        given = msgspec.json.encode(law.as_field()).decode()
         bound = "must have numbers of 2^-900 to 2^900 in size, or 0, beside the table's size and period"
         raise BadInput(f"{field} = {given}, {bound}")
     return found

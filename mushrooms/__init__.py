@@ -1,7 +1,7 @@
 """The face of the project: command line, plots, HTML reports.
 
-`mushrooms.main` lists the commands, and the module of each. From Python one uses `orbits`, `lyapunov`
-and `figures`; `store` keeps long runs on disk.
+`mushrooms.main` lists the commands, and the module of each. From Python one uses `orbits`,
+`lyapunov` and `figures`; `store` keeps long runs on disk.
 """
 
 __all__ = ["__version__"]

@@ -1,12 +1,15 @@
 """`mushrooms bench`: speed against error on the same runs, and error growth.
 
-Our steppers are among the solvers that are measured, and the proofs are what all are measured against.
+Our steppers are among the solvers that are measured, and the proofs are what all are measured
+against.
 """
 
 import math
 import tempfile
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.markup import escape
@@ -43,7 +46,9 @@ from scene import BadInput, Collision, Scene, State
 from scene.files.writer import write_files
 from scene.refusal import refuse_unheeded
 
-TIMEOUT, RESTARTS = 30.0, 1  # of a command
+# Of a command.
+TIMEOUT = 30.0
+RESTARTS = 1
 # By size: questions of a workload, steps with walls only, runs, trajectories and their length.
 QUESTIONS = {"quick": 12, "full": 64}
 FURTHER = {"quick": 200, "full": 2000}
@@ -53,23 +58,47 @@ PATHS = {"quick": (3, 40), "full": (9, 80)}
 DIGITS = (15, 30, 50, 100, 200)  # of the proofs that are timed
 PATH_DIGITS = (30, 60)  # working decimals of the proofs whose growth is followed
 LANES_SERVE = (
-    "breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12", "two-harmonics",
-    "sixteen-harmonics", "moving-slope", "bang-bang", "one-path",
+    "breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12",
+    "two-harmonics", "sixteen-harmonics", "moving-slope", "bang-bang", "one-path",
 )  # fmt: skip
 
 
-def measure_solvers(
-    command: list[str], out: Path, quick: bool, seed: int, table: Path | None, workload: str | None
-) -> None:
-    """Measure speed against error and write it into a folder; or print a table of an earlier benchmark."""
-    if table is not None:
-        refuse_unheeded({"--quick": quick or None, "COMMAND": command or None}, "--table measures nothing")
-        print(bench_page.to_markdown(record.read(table), workload or bench_page.HEADLINE), end="")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchOptions:
+    """The options of `mushrooms bench`.
+
+    Attributes:
+        command: program and arguments of another stepper to measure.
+        out: folder for the results.
+        quick: fewer questions and runs.
+        seed: of the questions.
+        table: an earlier bench.json, of which a table is printed.
+        workload: of the table; None for the headline's.
+    """
+
+    command: Sequence[str] | None
+    out: Path
+    quick: bool
+    seed: int
+    table: Path | None
+    workload: str | None
+
+
+def measure_solvers(options: BenchOptions) -> None:
+    """Measure speed against error and write it into a folder.
+
+    Or print a table of an earlier benchmark.
+    """
+    if options.table is not None:
+        measuring = {"--quick": options.quick or None, "COMMAND": options.command or None}
+        refuse_unheeded(measuring, "--table measures nothing")
+        earlier = record.read(options.table)
+        print(bench_page.to_markdown(earlier, options.workload or bench_page.HEADLINE), end="")
         return
-    refuse_unheeded({"--workload": workload}, "it needs --table")
-    size: Size = "quick" if quick else "full"
-    with writable_folder(out) as folder, announce_compilation():
-        found = _measure(size, seed, command)
+    refuse_unheeded({"--workload": options.workload}, "it needs --table")
+    size: Size = "quick" if options.quick else "full"
+    with writable_folder(options.out) as folder, announce_compilation():
+        found = _measure(size, options.seed, options.command or [])
         picture = style.svg(bench_page.headline(found))
         write_files(
             folder,
@@ -86,10 +115,12 @@ def measure_solvers(
     print(f"{found.seconds:.0f} s. Report: {folder / 'bench.html'}")
 
 
-def _measure(size: Size, seed: int, command: list[str]) -> Record:
+def _measure(size: Size, seed: int, command: Sequence[str]) -> Record:
     """Run everything."""
     begin = time.monotonic()
-    n_questions, n_further, repeats = QUESTIONS[size], FURTHER[size], REPEATS[size]
+    n_questions = QUESTIONS[size]
+    n_further = FURTHER[size]
+    repeats = REPEATS[size]
     effort = solvers.Effort(repeats, *LASTING[size])
     with ExitStack() as stack:
         bar = stack.enter_context(progress_bar())
@@ -105,6 +136,7 @@ def _measure(size: Size, seed: int, command: list[str]) -> Record:
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
+            fast.warm(workload.scene)  # what is measured is compiled code
             found, failures = solvers.measure(workload, running, effort, tick)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in failures.items()}
@@ -121,7 +153,8 @@ def _measure(size: Size, seed: int, command: list[str]) -> Record:
         digits=workloads.DIGITS,
         machine=record.this_machine(built),
         workloads=tuple(
-            record.Drawn(rule.name, rule.what, rule.scene, n_questions, n_further) for rule in workloads.RULES
+            record.Drawn(rule.name, rule.what, rule.scene, n_questions, n_further)
+            for rule in workloads.RULES
         ),
         points=tuple(points),
         not_run=not_run,
@@ -130,11 +163,14 @@ def _measure(size: Size, seed: int, command: list[str]) -> Record:
     )
 
 
-def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
+def _solvers(
+    stack: ExitStack, command: Sequence[str]
+) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
     """Return solvers, what was compiled, and what cannot run."""
     limits = Limits(TIMEOUT, RESTARTS)
     found = [*our_solvers(), *baselines.in_python()]
-    built, not_run = dict[str, str](), dict[str, str]()
+    built = dict[str, str]()
+    not_run = dict[str, str]()
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     try:
         library, built["lean C"] = baselines.build(folder, baselines.FLAGS)
@@ -161,8 +197,13 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
     return found, built, not_run
 
 
-def prove_path(scene: Scene, state: State, n_collisions: int) -> tuple[list[PathPoint], list[Sensitivity]]:
-    """Follow a path by proof, right to twenty digits at its end, and chain the Jacobians of its steps."""
+def prove_path(
+    scene: Scene, state: State, n_collisions: int
+) -> tuple[list[PathPoint], list[Sensitivity]]:
+    """Follow a path by proof and chain the Jacobians of its steps.
+
+    Twenty digits are right at its end.
+    """
     path = reference.trajectory(scene, state, n_collisions, digits=20, is_differentiated=True)
     links = Links(state)
     chain = [Sensitivity(links.add(step), links.held[0]) for step in path.steps]
@@ -182,7 +223,10 @@ def our_solvers() -> list[Solver]:
 
 
 def our_followers() -> dict[str, PathFollower]:
-    """Return followers of trajectories: binary64, with compensated time, and proofs of fixed precision."""
+    """Return followers of trajectories.
+
+    They use binary64, compensated time, or proofs of fixed precision.
+    """
     return {
         "binary64 (plain Python)": _plain_path,
         "compensated (fast)": _fast_path,
@@ -219,27 +263,39 @@ def _fine(workload: Workload, n_times: int) -> SolverRun:
 
 
 def _lanes(workload: Workload, n_times: int) -> SolverRun:
-    """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
+    """Time the engine on flights that go on from the questions.
+
+    Grade one round of its lanes on these.
+    """
     states = [q.state for q in workload.questions]
     copies = -(-128 // len(states))  # enough to fill both pools
     followed = states[:1] if workload.rule.length else states * copies
     t_end = workload.end(workload.rule.length or FLIGHTS)
-    seconds, n_collisions = 0.0, 0
+    seconds = 0.0
+    n_collisions = 0
     for _ in range(n_times):
         run, lasted = carry(workload.scene, followed, [None] * len(followed), t_end, 1)
-        n_collisions, seconds = n_collisions + int(run.wall_counts.sum()), seconds + lasted
-    return SolverRun(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
+        n_collisions = n_collisions + int(run.wall_counts.sum())
+        seconds = seconds + lasted
+    return SolverRun(
+        seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9
+    )
 
 
 def _trajectory(workload: Workload, n_times: int) -> SolverRun:
-    """Time a path from the first question, the call and its arrays included; grade a step from each."""
+    """Time a path from the first question, the call and its arrays included.
+
+    Grade a step from each.
+    """
     states = [q.state for q in workload.questions]
     paths = [fast.trajectory(workload.scene, state, 1) for state in states]
     begin = time.perf_counter_ns()
     for _ in range(n_times):
         fast.trajectory(workload.scene, states[0], workload.rule.length)
     ns = time.perf_counter_ns() - begin
-    answers: list[SolverAnswer] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
+    answers: list[SolverAnswer] = [
+        Collision(path.walls[0], *path.steps[0].tolist()) for path in paths
+    ]
     return SolverRun(ns / (n_times * workload.rule.length), answers, ns)
 
 
@@ -250,7 +306,9 @@ def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint
 
 def _fast_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
     path = fast.trajectory(scene, state, n_collisions)
-    return [PathPoint(wall, *row[2:]) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)]
+    return [
+        PathPoint(wall, *row[2:]) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)
+    ]
 
 
 def _fine_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:

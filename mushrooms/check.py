@@ -1,9 +1,10 @@
-"""`mushrooms check`: the conformance suite on a command, with its progress, summary and report files."""
+"""`mushrooms check`: the conformance suite on a command, its progress, summary and report files."""
 
 import secrets
 import shlex
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -38,53 +39,83 @@ MAX_ERRORS = 6  # lines of that
 COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
 
 
-def check_stepper(
-    command: list[str],
-    level: str,
-    seed: int | None,
-    timeout: float,
-    total: float | None,
-    restarts: int,
-    groups: str,
-    known_failures: Path | None,
-    reports_asked: Mapping[str, Path | None],
-    questions: Path | None,
-    answers: Path | None,
-) -> int:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckOptions:
+    """The options of `mushrooms check`.
+
+    Attributes:
+        command: program and arguments of the stepper.
+        level: core, extended or stress.
+        seed: of the questions; None for a new one.
+        timeout, total: seconds for one answer, and for the whole run; None for no limit.
+        restarts: fresh processes after the first.
+        groups: names separated by commas; empty for all.
+        known_failures: file of the cases that may fail.
+        json_file, junit, html, badge, summary: files for reports.
+        questions: file or folder of questions, to be written, or that were answered.
+        answers: file or folder to be graded.
+        corpus: the version that it must be; None for any.
+    """
+
+    command: Sequence[str] | None
+    level: str
+    seed: int | None
+    timeout: float
+    total: float | None
+    restarts: int
+    groups: str
+    known_failures: Path | None
+    json_file: Path | None
+    junit: Path | None
+    html: Path | None
+    badge: Path | None
+    summary: Path | None
+    questions: Path | None
+    answers: Path | None
+    corpus: str | None
+
+
+def check_stepper(options: CheckOptions) -> int:
     """Grade a stepper or a file of answers, or write a file of questions; return the exit code."""
-    files = _report_files(reports_asked)
-    if questions or answers:
+    require_corpus(options.corpus)
+    files = _report_files(options)
+    if options.questions or options.answers:
         refuse_unheeded(
             {
-                "COMMAND": command or None,
-                "--groups": groups or None,
-                "--known-failures": known_failures,
+                "COMMAND": options.command or None,
+                "--groups": options.groups or None,
+                "--known-failures": options.known_failures,
             },
             "questions and answers are in files",
         )
-    if answers:
-        run = grade_file(answers, questions, level, seed)
-    elif questions:
+    if options.answers:
+        run = grade_file(options.answers, options.questions, options.level, options.seed)
+    elif options.questions:
         refuse_unheeded({str(path): True for path in files}, "nothing is graded yet")
-        write_questions(questions, level, seed)
+        write_questions(options.questions, options.level, options.seed)
         return 0
     else:
-        names = _names_of(groups)
-        known = read_known(known_failures) if known_failures else frozenset()
-        with progress_bar() as bar:
-            run = check(
-                command,
-                level=level,
-                seed=seed,
-                groups=names,
-                limits=Limits(timeout, restarts, total),
-                known=known,
-                progress=Watch(bar, "check", "cases").update,
-            )
+        run = _hold_dialogue(options)
     for path, content in files.items():
         write_file(path, content(run))
     show(run)
     return run.exit_code()
+
+
+def _hold_dialogue(options: CheckOptions) -> Run:
+    """Ask a running stepper."""
+    names = _names_of(options.groups)
+    known = read_known(options.known_failures) if options.known_failures else frozenset()
+    with progress_bar() as bar:
+        return check(
+            options.command or [],
+            level=options.level,
+            seed=options.seed,
+            groups=names,
+            limits=Limits(options.timeout, options.restarts, options.total),
+            known=known,
+            progress=Watch(bar, "check", "cases").update,
+        )
 
 
 def require_corpus(version: str | None) -> None:
@@ -114,9 +145,9 @@ def to_html(run: Run) -> str:
     return check_page.to_html(run)
 
 
-# The ending and the content of each report file, by its option.
+# The ending and the content of each report file, by its field of `CheckOptions`.
 WRITERS: dict[str, tuple[str, Callable[[Run], bytes | str]]] = {
-    "json": (".json", reports.to_json),
+    "json_file": (".json", reports.to_json),
     "junit": (".xml", reports.to_junit),
     "html": (".html", to_html),
     "badge": (".svg", reports.to_badge),
@@ -124,15 +155,17 @@ WRITERS: dict[str, tuple[str, Callable[[Run], bytes | str]]] = {
 }
 
 
-def _report_files(given: Mapping[str, Path | None]) -> dict[Path, Callable[[Run], bytes | str]]:
+def _report_files(options: CheckOptions) -> dict[Path, Callable[[Run], bytes | str]]:
     """Return the report files that are asked for, each with what makes its content."""
     files: dict[Path, Callable[[Run], bytes | str]] = {}
-    for option, path in given.items():
+    for name, (suffix, content) in WRITERS.items():
+        path: Path | None = getattr(options, name)
         if path is not None:
-            suffix, content = WRITERS[option]
             check_file(path, (suffix,))
             if path in files:
-                raise BadInput(f"output {str(path)!r} is asked for twice, must be a file for each report")
+                raise BadInput(
+                    f"output {str(path)!r} is asked for twice, must be a file for each report"
+                )
             files[path] = content
     return files
 
@@ -141,7 +174,9 @@ def show(run: Run) -> None:
     """Print verdicts by group, with every denominator, and what stands against success."""
     groups = [*(reports.summarise(run, group) for group in run.groups()), reports.summarise(run)]
     seen = [verdict for verdict in VERDICTS if verdict == "pass" or groups[-1].counts[verdict]]
-    verdicts = [Column(verdict, style=COLOURS.get(verdict, "bold red"), justify="right") for verdict in seen]
+    verdicts = [
+        Column(verdict, style=COLOURS.get(verdict, "bold red"), justify="right") for verdict in seen
+    ]
     numbers = [Column(name, justify="right") for name in ("worst ulps", "A/B/C", "class")]
     heads = [Column("group", no_wrap=True), Column("cases", justify="right"), *verdicts, *numbers]
     table = Table(*heads, title=_title(run))
@@ -155,6 +190,15 @@ def show(run: Run) -> None:
         table.add_row(*row, end_section=group is groups[-2])
     console = new_console(soft_wrap=True)
     print_table(console, table)
+    _show_measured(console, run)
+    _show_objections(console, run)
+    console.print(_verdict(run, groups[-1]))
+    colour = "green" if run.exit_code() == 0 else "red"
+    console.print(f"[bold {colour}]{run.verdict()}[/]: {escape(str(run.scope()))}")
+
+
+def _show_measured(console: Console, run: Run) -> None:
+    """Print the speed, and what the statistics found."""
     if run.speed:
         console.print(
             f"Speed on {run.speed.scene}: {run.speed.best_ns:.4g} ns per collision,"
@@ -163,40 +207,46 @@ def show(run: Run) -> None:
     for result in run.results:
         if result.group == "profile" and result.verdict == "pass":
             console.print(f"{result.id}: {result.why}.")
-    _show_objections(console, run)
-    console.print(_verdict(run, groups[-1]))
-    colour = "green" if run.exit_code() == 0 else "red"
-    console.print(f"[bold {colour}]{run.verdict()}[/]: {escape(str(run.scope()))}")
 
 
 def _show_objections(console: Console, run: Run) -> None:
-    """Print why the run does not succeed: what was given beside what is certified, and what fails alike."""
-    objections, stderr = run.objections(), run.stderr.split("\n")
+    """Print why the run does not succeed.
+
+    What was given stands beside what is certified; what fails alike is named.
+    """
+    objections = run.objections()
     for line in objections[:MAX_SHOWN]:
         console.print(f"[red]{escape(line)}[/]")
     if len(objections) > MAX_SHOWN:
         console.print(f"... and {len(objections) - MAX_SHOWN} more: --json FILE has them all.")
-    broken = [r for r in run.results if not r.is_right and (r.verdict == "crashed" or r.group == "protocol")]
-    if broken and any(stderr):
-        console.print("Its standard error ends:")
-        for line in [line for line in stderr if line.strip()][-MAX_ERRORS:]:
-            console.print(f"  {escape(line[:MAX_SENT])}")
-    for result in [r for r in run.results if r.expected and not r.is_known and not r.is_right][:MAX_TAUGHT]:
+    _show_stderr(console, run)
+    wrong = [result for result in run.results if not result.is_right and not result.is_known]
+    for result in [result for result in wrong if result.expected][:MAX_TAUGHT]:
         again = f"mushrooms ask {result.id} --seed {run.seed}"
         console.print(f"{result.id}, asked {escape(result.asked)}; {again} prints it")
         console.print(f"  given     {escape(format_outcome(result.given))}")
         console.print(f"  certified {escape(format_outcome(result.expected))}")
-    wrong = [r for r in run.results if not r.is_right and not r.is_known]
-    for result in [r for r in wrong if r.paste][:MAX_TAUGHT]:
-        console.print(
-            f"{result.id} as a test, where implementation is {run.command}:", markup=False, soft_wrap=True
-        )
+    for result in [result for result in wrong if result.paste][:MAX_TAUGHT]:
+        head = f"{result.id} as a test, where implementation is {run.command}:"
+        console.print(head, markup=False, soft_wrap=True)
         console.print(result.paste, markup=False, soft_wrap=True)
-    for result in [r for r in wrong if r.sent and r.group == "protocol"][:MAX_TAUGHT]:
+    of_protocol = [result for result in wrong if result.group == "protocol"]
+    for result in [result for result in of_protocol if result.sent][:MAX_TAUGHT]:
         rest = "... (--json FILE has it whole)" if len(result.sent) > MAX_SENT else ""
         console.print(f"{result.id}, sent last: {escape(result.sent[:MAX_SENT])}{rest}")
     for line in run.diagnosis:
         console.print(f"[yellow]{escape(line)}[/]")
+
+
+def _show_stderr(console: Console, run: Run) -> None:
+    """Print how the standard error ends if a process crashed or broke the protocol."""
+    wrong = [result for result in run.results if not result.is_right]
+    is_broken = any(result.verdict == "crashed" or result.group == "protocol" for result in wrong)
+    lines = run.stderr.split("\n")
+    if is_broken and any(lines):
+        console.print("Its standard error ends:")
+        for line in [line for line in lines if line.strip()][-MAX_ERRORS:]:
+            console.print(f"  {escape(line[:MAX_SENT])}")
 
 
 def format_outcome(outcome: dict[str, Any] | None) -> str:
@@ -241,14 +291,22 @@ def write_questions(path: Path, level: str, seed: int | None) -> None:
                 raise BadInput(f"--questions = {str(path)!r} is not empty, must be a new folder")
             sheet = _draw_sheet(level, seed)
             n = write_tables(sheet, folder)
-    more = f", {len(sheet.questions) - n} left out that CSV cannot hold" if n < len(sheet.questions) else ""
+    more = (
+        f", {len(sheet.questions) - n} left out that CSV cannot hold"
+        if n < len(sheet.questions)
+        else ""
+    )
     print(f"{n} questions of level {level} and seed {seed}{more}: {path}")
     print(f"Grade the answers with: mushrooms check --questions {path} --answers FILE")
 
 
 def _draw_sheet(level: str, seed: int) -> Sheet:
     """Return the questions of a run, and say that they take a while: many are proved anew."""
-    print(f"drawing and proving the questions of seed {seed}: some 20 seconds", file=sys.stderr, flush=True)
+    print(
+        f"drawing and proving the questions of seed {seed}: some 20 seconds",
+        file=sys.stderr,
+        flush=True,
+    )
     return Sheet(level, seed)
 
 
@@ -257,7 +315,8 @@ def grade_file(answers: Path, questions: Path | None, level: str, seed: int | No
 
     Args:
         answers: the file, or a folder of CSV files.
-        questions: what they answer, where the key is beside it; else the fresh questions are proved anew.
+        questions: what they answer, where the key is beside it; else the fresh questions are proved
+            anew.
         level: of the questions, where nothing else tells.
         seed: likewise; None where the answers tell it.
 
@@ -272,5 +331,7 @@ def grade_file(answers: Path, questions: Path | None, level: str, seed: int | No
         return grade_answers(sheet, found)
     written_with = signed(found.echoes) if seed is None else (level, seed)
     if written_with is None:
-        raise BadInput("--answers: give --questions, or the --seed and --level that they were written with")
+        raise BadInput(
+            "--answers: give --questions, or the --seed and --level that they were written with"
+        )
     return grade_answers(Sheet(*written_with), found)

@@ -1,5 +1,9 @@
-"""`mushrooms draw`: a table through its cycle, and what particles do in it; the export of a trajectory."""
+"""`mushrooms draw`: a table through its cycle, and what particles do in it.
 
+The export of a trajectory.
+"""
+
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -17,14 +21,12 @@ from mushrooms.store.run import is_run, open_run
 from scene import BadInput, Scene, Stem
 from scene.files.tables import SUFFIXES
 from scene.files.writer import write_file
-from scene.laws import bounds
 from scene.named import is_scene, scene_named
 from scene.refusal import refuse_unheeded
-from scene.tables import laws
 
 
 class Usual(NamedTuple):
-    """What a picture takes when nothing is asked: particles, crossings of the table a cycle, the end."""
+    """What a picture takes if nothing is asked: particles, crossings in a cycle, the end."""
 
     n_orbits: int
     crossings: float
@@ -40,15 +42,34 @@ PICTURES = {
     "lyapunov": Usual(3, 1000.0, 256),
 }
 # Slow particles: where the wall moves as fast as they do, chaos and islands lie side by side.
-SECTION_OF_STEM, OF_STEM_AT_PHASE = Usual(40, 4.0, 4000), Usual(40, 4.0, None, 400)
+SECTION_OF_STEM = Usual(40, 4.0, 4000)
+OF_STEM_AT_PHASE = Usual(40, 4.0, None, 400)
 SECTION_AT_PHASE = Usual(40, 60.0, None, 60)
 OF_MANY = ("section", "map", "growth", "lyapunov")
 LEAST_DRAWN = 1e-100  # of lengths and times; its inverse is the greatest
 
 
-class DrawOptions(NamedTuple):
-    """What the command line says of the particles of every picture; None is what it does not say."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawOptions:
+    """The options of `mushrooms draw`; None is what the command line does not say.
 
+    Attributes:
+        scene: a name, a file, or the folder of a run.
+        out: file of the picture; several get their kinds into its name.
+        trajectory, section, boundary_map, growth, lyapunov: the pictures that are asked for.
+        export: file for a trajectory.
+        energy, collisions, cycles, particles, seed: of the particles of every picture.
+        phase: of a section.
+    """
+
+    scene: str
+    out: Path | None
+    trajectory: bool
+    section: bool
+    boundary_map: bool
+    growth: bool
+    lyapunov: bool
+    export: Path | None
     energy: float | None
     collisions: int | None
     cycles: int | None
@@ -56,11 +77,25 @@ class DrawOptions(NamedTuple):
     seed: int | None
     phase: float | None
 
-    def given(self) -> dict[str, object]:
-        """Return the options by their names."""
-        return {f"--{name}": value for name, value in self._asdict().items()}
+    def kinds(self) -> list[str]:
+        """Return the kinds of pictures of particles that are asked for."""
+        asked = {
+            "trajectory": self.trajectory,
+            "section": self.section,
+            "map": self.boundary_map,
+            "growth": self.growth,
+            "lyapunov": self.lyapunov,
+        }
+        return [kind for kind, is_asked in asked.items() if is_asked]
 
-    def follow(self, scene: Scene, kind: str, n_orbits: int | None = None) -> list[orbits.FollowedOrbit]:
+    def of_particles(self) -> dict[str, object]:
+        """Return what is said of the particles, by the names of the options."""
+        names = ("energy", "collisions", "cycles", "particles", "seed", "phase")
+        return {f"--{name}": getattr(self, name) for name in names}
+
+    def follow(
+        self, scene: Scene, kind: str, n_orbits: int | None = None
+    ) -> list[orbits.FollowedOrbit]:
         """Return the orbits for a kind of picture."""
         usual = usual_of(kind, scene, self.phase)
         n_cycles = self.cycles or (None if self.collisions else usual.n_cycles)
@@ -85,17 +120,22 @@ def usual_of(kind: str, scene: Scene, phase: float | None) -> Usual:
     return PICTURES[kind] if kind != "section" or phase is None else SECTION_AT_PHASE
 
 
-def draw_scene(
-    name: str, out: Path | None, kinds: list[str], export: Path | None, options: DrawOptions
-) -> None:
-    """Draw pictures of a scene, or of a stored run, and export a trajectory; print the names of the files."""
+def draw_scene(options: DrawOptions) -> None:
+    """Draw pictures of a scene, or of a stored run, and export a trajectory.
+
+    Print the names of the files.
+    """
+    name = options.scene
+    out = options.out
+    export = options.export
+    kinds = options.kinds()
     if is_run(Path(name)) or (Path(name).is_dir() and not is_scene(name)):
         asked = {f"--{kind}": True for kind in kinds} | {"--export": export}
-        refuse_unheeded(asked | options.given(), f"{name!r} is a run")
+        refuse_unheeded(asked | options.of_particles(), f"{name!r} is a run")
         _draw_run(Path(name), out)
         return
     scene = scene_named(name)
-    _check_heeded(kinds, export, options)
+    _check_heeded(options)
     check_file(export, SUFFIXES)
     is_drawn = kinds or export is None or out is not None
     paths = _paths(scene, out or Path(f"{Path(name).stem}.svg"), kinds) if is_drawn else {}
@@ -108,16 +148,19 @@ def draw_scene(
             print(path)
 
 
-def _check_heeded(kinds: list[str], export: Path | None, options: DrawOptions) -> None:
+def _check_heeded(options: DrawOptions) -> None:
     """Refuse options that no picture heeds."""
+    kinds = options.kinds()
     if not set(kinds) & set(OF_MANY):
         refuse_unheeded({"--particles": options.particles}, f"it is of --{', --'.join(OF_MANY)}")
     if "section" not in kinds:
         refuse_unheeded({"--phase": options.phase}, "it is of --section")
     if kinds == ["growth"] and options.particles != 1:
-        refuse_unheeded({"--collisions": options.collisions}, "the growth of many goes through --cycles")
-    if not kinds and export is None:
-        refuse_unheeded(options.given(), "the picture of the walls has no particles")
+        refuse_unheeded(
+            {"--collisions": options.collisions}, "the growth of many goes through --cycles"
+        )
+    if not kinds and options.export is None:
+        refuse_unheeded(options.of_particles(), "the picture of the walls has no particles")
 
 
 def _draw_run(folder: Path, out: Path | None) -> None:
@@ -135,7 +178,9 @@ def _paths(scene: Scene, out: Path, kinds: list[str]) -> dict[str, Path]:
     Raises:
         BadInput: one of them cannot be drawn, or not written, or does not move and is to be a .gif.
     """
-    found = {f"scene.{name}": bounds(law).highest for name, law in laws(scene).items() if name != "slope"}
+    found = {
+        f"scene.{name}": law.bounds().highest for name, law in scene.laws.items() if name != "slope"
+    }
     found |= {"period": scene.period} if scene.period else {}
     for name, size in found.items():  # squares and sums of them are in a figure
         if not LEAST_DRAWN <= size <= 1 / LEAST_DRAWN:
@@ -185,7 +230,8 @@ def _growth(scene: Scene, options: DrawOptions) -> Figure:
     """Return the figure of an ensemble's energies from cycle to cycle."""
     usual = PICTURES["growth"]
     energy = options.energy or orbits.usual_energy(scene, usual.crossings)
-    n, n_cycles = options.particles or usual.n_orbits, options.cycles or usual.n_cycles or 1
+    n = options.particles or usual.n_orbits
+    n_cycles = options.cycles or usual.n_cycles or 1
     with progress_bar() as bar:
         found = fast.simulate(
             scene,

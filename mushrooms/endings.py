@@ -1,6 +1,7 @@
 """How a command ends: the exit code and the line.
 
-Bad input of any kind is one line on stderr and exit code 2.
+Bad input of any kind is one line on stderr and exit code 2. What `mushrooms check` finds has its
+code from `conformance.suite.result`.
 """
 
 import codecs
@@ -21,7 +22,8 @@ from mushrooms import environment
 from mushrooms.commands import app
 from mushrooms.interrupts import INTERRUPTED, PROGRAM, Listener
 
-# Typer 0.26 carries a click of its own, older ones import it: this is the error class of the one in use.
+# Typer 0.26 carries a click of its own, older ones import it: this is the error class of the one in
+# use.
 UsageError: type[Any] = typer.BadParameter.__bases__[0]
 REFUSED = 2
 HELP = {"--help", "--version"}  # they import no library that reads the environment
@@ -32,7 +34,8 @@ ENDS: dict[type[Exception], str] = {
     MemoryError: "not enough memory",
     RecursionError: "nested too deeply",
 }
-# Libraries that read the environment when they are imported, and how the names of their variables begin.
+# Libraries that read the environment when they are imported, and how the names of their variables
+# begin.
 CONFIGURED_BY = {
     "numba": "NUMBA_",
     "llvmlite": "LLVMLITE_",
@@ -73,7 +76,10 @@ def _end_of(given: list[str], listener: Listener) -> int:
 
 
 def _invoke(given: list[str]) -> int:
-    """Run a command, not by typer's `main`, which calls a file that ends too soon an interruption."""
+    """Run a command, but not by typer's `main`.
+
+    That one calls a file that ends too soon an interruption.
+    """
     _refuse_empty(given)
     if not HELP.intersection(given):
         _check_environment()
@@ -101,7 +107,10 @@ def _is_made_of_an_interrupt(error: BaseException | None) -> bool:
 
 
 def _refuse(error: BaseException) -> int:
-    """Say what was wrong with the input, or with the machine; raise the error if it is our own fault."""
+    """Say what was wrong with the input, or with the machine.
+
+    Raise the error if it is our own fault.
+    """
     if isinstance(error, BrokenPipeError):
         return 1  # the reader has gone: nothing to say
     if isinstance(error, UsageError):
@@ -115,15 +124,20 @@ def _refuse(error: BaseException) -> int:
 
     if isinstance(error, BadInput):
         return _tell(REFUSED, str(error))
-    if variables := _variables_behind(error):
+    variables = _variables_behind(error)
+    if variables:
         return _tell(REFUSED, f"environment variable {' or '.join(variables)}: {error}")
     raise error
 
 
 def _variables_behind(error: BaseException) -> list[str]:
-    """Return the variables that configure a library, with their values, if it fails while it is imported."""
+    """Return the variables that configure a library, if it fails while it is imported.
+
+    Their values stand beside them.
+    """
     being_imported = set[str]()
-    library, at = "", error.__traceback__
+    library = ""
+    at = error.__traceback__
     while at is not None:
         library = str(at.tb_frame.f_globals.get("__name__")).partition(".")[0]
         if at.tb_frame.f_code.co_name == "<module>":
@@ -132,7 +146,11 @@ def _variables_behind(error: BaseException) -> list[str]:
     prefix = CONFIGURED_BY.get(library)
     if prefix is None or library not in being_imported:
         return []
-    return [f"{name} = {value!r}" for name, value in sorted(os.environ.items()) if name.startswith(prefix)]
+    return [
+        f"{name} = {value!r}"
+        for name, value in sorted(os.environ.items())
+        if name.startswith(prefix)
+    ]
 
 
 def _format_warning(message: Warning | str, *_place: object) -> str:
@@ -141,41 +159,65 @@ def _format_warning(message: Warning | str, *_place: object) -> str:
 
 
 def _refuse_empty(given: list[str]) -> None:
-    """Refuse an option or an argument of no text: for a path it would mean the folder that one is in."""
+    """Refuse an option or an argument of no text.
+
+    As a path it would mean the current folder.
+    """
     for before, word in pairwise(["", *given]):
         if word == "--":
             return
         if not word.strip() or (word.startswith("--") and word.endswith("=")):
-            name = next((option for option in (word, before) if option.startswith("--")), "an argument")
+            name = next(
+                (option for option in (word, before) if option.startswith("--")), "an argument"
+            )
             raise UsageError(f"{name.rstrip('=')} is empty, must have a value")
 
 
 def _tell(code: int, message: str, error: BaseException | None = None) -> int:
-    """Say on stderr in one line how a command ends, with the notes of the error; return the exit code."""
+    """Say on stderr in one line how a command ends, with the notes of the error.
+
+    Return the exit code.
+    """
     text = "; ".join([message, *getattr(error, "__notes__", [])])
-    with suppress(OSError):  # standard error may be full, or its terminal gone: the exit code still tells
-        print(f"{PROGRAM}: {_quote_for_shells(' '.join(text.split()))}", file=sys.stderr, flush=True)
+    with suppress(
+        OSError
+    ):  # standard error may be full, or its terminal gone: the exit code still tells
+        print(
+            f"{PROGRAM}: {_quote_for_shells(' '.join(text.split()))}", file=sys.stderr, flush=True
+        )
     return code
 
 
 def _format_error(error: OSError) -> str:
-    """Return what the system refused; of a file it gives the name (`scene.files.writer` sees to that)."""
-    if error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT):
+    """Return what the system refused.
+
+    Of a file it gives the name (`scene.files.writer` sees to that).
+    """
+    if error.filename is None and error.errno in (
+        errno.ENOSPC,
+        errno.EIO,
+        errno.EBADF,
+        errno.EDQUOT,
+    ):
         return f"standard output cannot be written: {error.strerror}"
-    return str(error) if error.filename is None else f"{os.fsdecode(error.filename)!r}: {error.strerror}"
+    return (
+        str(error)
+        if error.filename is None
+        else f"{os.fsdecode(error.filename)!r}: {error.strerror}"
+    )
 
 
 def _make_printable() -> None:
     """See to it that nothing fails for want of a place to print it, or of a letter.
 
-    Work is done before its result is printed: it must not be lost there. What was closed takes everything and
-    keeps nothing, and no file that a command opens becomes its standard output. A letter that the encoding
-    lacks is printed by its number.
+    Work is done before its result is printed: it must not be lost there. What was closed takes
+    everything and keeps nothing, and no file that a command opens becomes its standard output. A
+    letter that the encoding lacks is printed by its number.
     """
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:
             mode = "r" if name == "stdin" else "w"
-            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 (till the end)
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
     codecs.register_error(AS_GIVEN, _encode_as_given)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -183,7 +225,10 @@ def _make_printable() -> None:
 
 
 def _encode_as_given(error: UnicodeError) -> tuple[bytes | str, int]:
-    """Print a byte of a path that is no letter as the byte it is; another letter that lacks by its number."""
+    """Print a byte of a path that is no letter as the byte it is.
+
+    Another letter that lacks by its number.
+    """
     if not isinstance(error, UnicodeEncodeError):
         raise error
     letter = error.object[error.start]
@@ -193,7 +238,10 @@ def _encode_as_given(error: UnicodeError) -> tuple[bytes | str, int]:
 
 
 def _quote_for_shells(text: str) -> str:
-    """Write quoted paths that hold bytes which are no letters as shells read them, begun by a dollar sign."""
+    """Write quoted paths as shells read them, if they hold bytes that are no letters.
+
+    They then begin with a dollar sign.
+    """
 
     def quote(found: re.Match[str]) -> str:
         word = found[0][1:-1]
@@ -206,7 +254,10 @@ def _quote_for_shells(text: str) -> str:
 
 
 def _let_go(stream: IO[str]) -> None:
-    """Leave nothing for the interpreter to flush at its end: what fails there makes every exit code 120."""
+    """Leave nothing for the interpreter to flush at its end.
+
+    What fails there makes every exit code 120.
+    """
     try:
         stream.flush()
     except (OSError, ValueError):

@@ -33,10 +33,14 @@ def writable_folder(path: Path) -> Iterator[Path]:
         path.mkdir(parents=True, exist_ok=True)
         _probe(path / "probe")
     except (FileExistsError, NotADirectoryError):
-        raise BadInput(f"output {str(path)!r}: {str(folder)!r} is a file, must be a folder") from None
+        raise BadInput(
+            f"output {str(path)!r}: {str(folder)!r} is a file, must be a folder"
+        ) from None
     except OSError as error:
         _remove_empty(made)
-        raise BadInput(f"output {str(path)!r} must be a writable folder: {error.strerror}") from None
+        raise BadInput(
+            f"output {str(path)!r} must be a writable folder: {error.strerror}"
+        ) from None
     try:
         yield path
     except BaseException:
@@ -48,7 +52,8 @@ def writable_folder(path: Path) -> Iterator[Path]:
 def locked(folder: Path) -> Iterator[None]:
     """Hold a folder; meanwhile all others are refused it, here and in another process.
 
-    The system lets go of it when the process ends, however it ends. No clock and no process number decides.
+    The system lets go of it when the process ends, however it ends. No clock and no process number
+    decides.
 
     Args:
         folder: an existing folder that can be written in.
@@ -70,12 +75,15 @@ def locked(folder: Path) -> Iterator[None]:
             raise BadInput(f"folder {str(folder)!r} is in use by {holder}: one run at a time")
         try:
             file.truncate(0)
-            # Past the buffer: what a full disk does not take would stay in it, and fail unnamed on closing.
+            # Past the buffer: what a full disk does not take would stay in it, and fail unnamed on
+            # closing.
             with named(path):
                 os.write(file.fileno(), f"process {os.getpid()} on {platform.node()}".encode())
             yield
         finally:
-            with suppress(PermissionError):  # Windows removes no open file; one that is not held is harmless
+            with suppress(
+                PermissionError
+            ):  # Windows removes no open file; one that is not held is harmless
                 path.unlink(missing_ok=True)
 
 

@@ -1,11 +1,12 @@
 """Signals that end a command: none is lost, and after each the command ends in one line.
 
-Python raises an interrupt wherever the main thread is. Where that is a callback of a compiler, a `__del__` or
-a bare `except`, the exception is thrown away and the command goes on. So an `Interrupt` that is thrown away
-is raised again a moment later, until it reaches the place that ends the command.
+Python raises an interrupt wherever the main thread is. Where that is a callback of a compiler, a
+`__del__` or a bare `except`, the exception is thrown away and the command goes on. So an
+`Interrupt` that is thrown away is raised again a moment later, until it reaches the place that ends
+the command.
 
-SIGTERM and SIGHUP do what SIGINT does: a batch system ends its jobs so. A signal that is ignored from the
-start (`nohup`) stays ignored.
+SIGTERM and SIGHUP do what SIGINT does: a batch system ends its jobs so. A signal that is ignored
+from the start (`nohup`) stays ignored.
 
 This module is imported before anything else is: it imports only what the interpreter has soon.
 """
@@ -18,14 +19,19 @@ import sys
 import time
 from types import FrameType
 
-PROGRAM, INTERRUPTED = "mushrooms", 130
+PROGRAM = "mushrooms"
+INTERRUPTED = 130
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 AGAIN = 0.05  # seconds after which an interrupt that was thrown away is raised again
-SAME = 0.5  # seconds in which further signals are the same Ctrl-C: a wrapper has it too, and passes it on
+# Seconds in which further signals are the same Ctrl-C: a wrapper has it too, and passes it on.
+SAME = 0.5
 
 
 def say_interrupted() -> None:
-    """Say on stderr that a command was interrupted. Only the system is used: anything may be half loaded."""
+    """Say on stderr that a command was interrupted.
+
+    Only the system is used: anything may be half loaded.
+    """
     if sys.stderr is not None:  # where it was closed, its number may be that of another file
         try:  # noqa: SIM105 (contextlib takes long to load)
             os.write(2, f"{PROGRAM}: interrupted\n".encode())
@@ -41,7 +47,10 @@ class Interrupt(KeyboardInterrupt):
         self._listener = listener
 
     def __reduce__(self) -> tuple[type[Interrupt], tuple[()]]:
-        """Leave the listener behind: in another process, or as a copy, it is an interrupt like any other."""
+        """Leave the listener behind.
+
+        In another process, or as a copy, it is an interrupt like any other.
+        """
         return Interrupt, ()
 
     def __del__(self) -> None:
@@ -63,7 +72,8 @@ class Listener:
 
     def __init__(self, *, is_program: bool) -> None:
         self.has_heard = False
-        self._is_program, self._first = is_program, 0.0
+        self._is_program = is_program
+        self._first = 0.0
         self._code: int | None = None  # in which the command has ended
         self._before: dict[int, object] = {}
         self._can_repeat = False
@@ -92,7 +102,7 @@ class Listener:
         if not self._is_program:
             sys.unraisablehook = self._unraisable
             for number, handler in self._before.items():
-                signal.signal(number, handler)  # type: ignore[arg-type]  # what signal.signal returned
+                signal.signal(number, handler)  # type: ignore[arg-type]
 
     def raise_again(self) -> None:
         """Raise an interrupt soon: the last one was thrown away, if the command has not ended.
@@ -113,7 +123,8 @@ class Listener:
         if self.has_heard and self._is_program:
             say_interrupted()
             os._exit(INTERRUPTED)
-        self.has_heard, self._first = True, now
+        self.has_heard = True
+        self._first = now
         raise Interrupt(self)
 
     def _repeat(self, _number: int, _frame: FrameType | None) -> None:

@@ -1,12 +1,12 @@
 """Finite-time Lyapunov exponents: how fast neighbouring particles separate along an orbit.
 
-Idea. The reference proves each step of an orbit and gives the Jacobian d(dt, x, y, vx, vy) / d(t, x, y, vx,
-vy). The product of these stretches a small deviation. Lengths are in units of the table, and velocities in
-units of the present speed. The exponent after n collisions is the mean of the logs of the stretches. Its
-error is the standard error over N_BLOCKS equal parts of the orbit. This holds if a part is longer than the
-memory of the orbit. It is an error of the mean along this orbit. In the chaotic zone orbits stick near
-islands for long times, which a single orbit does not show. In an island the exponent falls as (log n) / n
-to 0.
+Idea. The reference proves each step of an orbit and gives the Jacobian d(dt, x, y, vx, vy) / d(t,
+x, y, vx, vy). The product of these stretches a small deviation. Lengths are in units of the table,
+and velocities in units of the present speed. The exponent after n collisions is the mean of the
+logs of the stretches. Its error is the standard error over N_BLOCKS equal parts of the orbit. This
+holds if a part is longer than the memory of the orbit. It is an error of the mean along this orbit.
+In the chaotic zone orbits stick near islands for long times, which a single orbit does not show. In
+an island the exponent falls as (log n) / n to 0.
 
 The Jacobians belong to the states in binary64. Each is right to some 16 digits.
 """
@@ -21,7 +21,7 @@ import numpy as np
 
 from mushrooms.orbits import FollowedOrbit
 from scene import BadInput, Undecided
-from scene.laws import FloatArray
+from scene.pieces import FloatArray
 
 N_BLOCKS = 16
 DIGITS = 16
@@ -59,13 +59,24 @@ def jacobians(orbit: FollowedOrbit, progress: Callable[[int], None] | None = Non
 
     out = np.empty((len(orbit.walls), 5, 5))
     for k, wall in enumerate(orbit.walls):
-        before, after = orbit.state(k), orbit.state(k + 1).t
+        before = orbit.state(k)
+        after = orbit.state(k + 1).t
         end = after + (after - before.t) + math.ulp(after)  # a horizon safely beyond the known hit
-        proved = reference.next_collision(orbit.scene, before, end, digits=DIGITS, is_differentiated=True)
+        proved = reference.next_collision(
+            orbit.scene, before, end, digits=DIGITS, is_differentiated=True
+        )
         if isinstance(proved, Undecided):
-            raise BadInput(f"collision {k + 1} of the orbit: the reference is undecided, {proved.reason}")
-        if not isinstance(proved, reference.Collision) or proved.jacobian is None or proved.wall != wall:
-            raise BadInput(f"collision {k + 1} of the orbit: {wall} is not what the reference proves")
+            raise BadInput(
+                f"collision {k + 1} of the orbit: the reference is undecided, {proved.reason}"
+            )
+        if (
+            not isinstance(proved, reference.Collision)
+            or proved.jacobian is None
+            or proved.wall != wall
+        ):
+            raise BadInput(
+                f"collision {k + 1} of the orbit: {wall} is not what the reference proves"
+            )
         out[k] = [[float(entry) for entry in row] for row in proved.jacobian]
         out[k, 0, 0] += 1.0  # the row is that of dt, and t after is t + dt
         if progress is not None:
@@ -92,11 +103,13 @@ def stretching(orbit: FollowedOrbit, progress: Callable[[int], None] | None = No
     units = np.column_stack([length / speeds, *[np.full(n + 1, length)] * 2, speeds, speeds])
     # At first without symmetry: equal parts sideways and in direction.
     vx, vy = states[0, 3:]
-    deviation, logs = np.array([0.0, -vy, vx, -vy, vx]) / (math.hypot(vx, vy) * math.sqrt(2.0)), np.empty(n)
+    deviation = np.array([0.0, -vy, vx, -vy, vx]) / (math.hypot(vx, vy) * math.sqrt(2.0))
+    logs = np.empty(n)
     for k, matrix in enumerate(jacobians(orbit, progress)):
         deviation = matrix @ (deviation * units[k]) / units[k + 1]
         size = float(np.linalg.norm(deviation))
-        logs[k], deviation = math.log(size), deviation / size
+        logs[k] = math.log(size)
+        deviation = deviation / size
     exponents = np.cumsum(logs) / np.arange(1, n + 1)
     blocks = logs[n % N_BLOCKS :].reshape(N_BLOCKS, -1).mean(axis=1)
     error = float(blocks.std(ddof=1) / math.sqrt(N_BLOCKS))

@@ -1,4 +1,4 @@
-"""The entry of the command line: it listens for signals before it imports anything that takes long."""
+"""The entry of the command line, which listens for signals before any import that takes long."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ def run(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 a claim failed, 2 bad input, 130 interrupted.
 
     Args:
-        arguments: of the command, which ends with SystemExit; None for those of this process. A process that
-            is interrupted ends at once, without what libraries do or report at its end.
+        arguments: of the command, which ends with SystemExit; None for those of this process. A
+            process that is interrupted ends at once, without what libraries do or report at its
+            end.
     """
     listener = Listener(is_program=arguments is None)
     listener.begin()

@@ -1,9 +1,10 @@
 """Orbits: the start and the collisions of one particle, with sections, maps, energies and export.
 
-`follow` draws starts like an ensemble: particle i of seed S is particle i of `fast.simulate(..., seed=S)`.
-Each is followed for the same number of collisions, or of cycles. An orbit has its energies, its hits in the
-coordinates of a Poincare section and of the boundary map, its capture intervals, and the energy that the
-adiabatic theory predicts for these intervals. Pictures: `mushrooms.figures.orbits`.
+`follow` draws starts like an ensemble: particle i of seed S is particle i of `fast.simulate(...,
+seed=S)`. Each is followed for the same number of collisions, or of cycles. An orbit has its
+energies, its hits in the coordinates of a Poincare section and of the boundary map, its capture
+intervals, and the energy that the adiabatic theory predicts for these intervals. Pictures:
+`mushrooms.figures.orbits`.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ from mushrooms.folders import check_file
 from scene import Outcome, Scene, State, Stem, Wall, check_scene
 from scene.files.tables import SUFFIXES, write_table
 from scene.geometry import TableAt, table_at
-from scene.laws import FloatArray, is_constant, values
 from scene.mouth import start_time
+from scene.pieces import FloatArray
 from scene.refusal import BadInput, check_count, check_number, check_seed
 
 BoolArray = npt.NDArray[np.bool_]
@@ -46,8 +47,10 @@ class Section(NamedTuple):
     Attributes:
         collision: (n,) number of the collision in the orbit, from 0.
         t: (n,) time of the hit [time].
-        place: (n,) arc length from the right end, divided by the length of the arc at that time, 0 to 1.
-        sin_phi: (n,) sin of the angle to the normal before the bounce; positive: clockwise (Eq:sinphi).
+        place: (n,) arc length from the right end, divided by the length of the arc at that time, 0
+            to 1.
+        sin_phi: (n,) sin of the angle to the normal before the bounce; positive: clockwise
+            (Eq:sinphi).
         nu: (n,) w / r at that time; 0 in a cap.
     """
 
@@ -125,11 +128,11 @@ class FollowedOrbit:
         return Section(index, t, np.arctan2(y, x) / math.pi, sine, nu)
 
     def phase_section(self, phase: float | None = None) -> FloatArray:
-        """Return (n, 2): the phase t/T, 0 to 1, of each hit of the moving wall, and the velocity after it.
+        """Return (n, 2): phase t/T, 0 to 1, of each hit of the moving wall, and velocity after it.
 
-        This is the section of Fermi and Ulam. If the floor of a stem moves, it has the hits of the floor and
-        vy; else the hits of both sides and |vx| [length/time]. With a phase of the walls it has y and vy at
-        that phase of each cycle.
+        This is the section of Fermi and Ulam. If the floor of a stem moves, it has the hits of the
+        floor and vy; else the hits of both sides and |vx| [length/time]. With a phase of the walls
+        it has y and vy at that phase of each cycle.
 
         Raises:
             BadInput: the table is not such a stem, or the phase is out of range.
@@ -140,7 +143,7 @@ class FollowedOrbit:
             times = self.instants(phase)
             last = np.searchsorted(self.states()[:, 0], times, side="right") - 1
             return np.column_stack([self.at(times)[:, 1], self.states()[last, 4]])
-        walls = ("left", "right") if is_constant(self.scene.h) else ("floor",)
+        walls = ("left", "right") if self.scene.laws["h"].is_constant else ("floor",)
         states = self.states()[1:][np.isin(self.walls, walls)]
         speed = states[:, 4] if walls == ("floor",) else np.abs(states[:, 3])
         phases = (states[:, 0] - start_time(self.scene)) / self.scene.period % 1.0
@@ -156,7 +159,8 @@ class FollowedOrbit:
             raise BadInput(f"phase = {phase}, must be at least 0 and below 1")
         if not self.scene.period:
             raise BadInput(f"phase = {phase}: the walls of this scene stand still")
-        begin, end = self.start.t, float(self.states()[-1, 0])
+        begin = self.start.t
+        end = float(self.states()[-1, 0])
         first = start_time(self.scene) + phase * self.scene.period
         lowest, highest = ((t - first) / self.scene.period for t in (begin, end))
         count = np.arange(math.ceil(lowest), math.floor(highest) + 1, dtype=np.float64)
@@ -165,8 +169,8 @@ class FollowedOrbit:
     def captured(self) -> BoolArray:
         """Return (n + 1,): whether the particle is captured on the flight from each state.
 
-        A capture interval begins with a captured arc hit. It ends with a free arc hit, or below the mouth. In
-        a cap every particle is captured.
+        A capture interval begins with a captured arc hit. It ends with a free arc hit, or below the
+        mouth. In a cap every particle is captured.
         """
         if not isinstance(self.scene, scenes.Mushroom):
             return np.full(len(self.walls) + 1, not isinstance(self.scene, Stem))
@@ -186,16 +190,18 @@ class FollowedOrbit:
         is_captured = self.captured()[:-1]
         if isinstance(self.scene, Stem):
             raise theory.NotCovered("the theory is of caps and mushrooms: table is stem")
-        rise = np.diff(-2 * np.log(values(self.scene.r, times)))
+        rise = np.diff(-2 * np.log(self.scene.laws["r"].values(times)))
         if isinstance(self.scene, scenes.Mushroom) and not is_captured.all():
-            rise = np.where(is_captured, rise, np.diff(theory.chaotic_zone(self.scene, times).log_energy))
+            rise = np.where(
+                is_captured, rise, np.diff(theory.chaotic_zone(self.scene, times).log_energy)
+            )
         return np.concatenate([[0.0], np.cumsum(rise)])
 
     def columns(self) -> dict[str, list[Any]]:
         """Return the orbit as columns of n + 1 rows, the start first; None marks a missing value.
 
-        They are collision, wall, dt, t, x, y, vx, vy, energy; at the arc also place, sin_phi, nu and captured
-        (see `Section`).
+        They are collision, wall, dt, t, x, y, vx, vy, energy; at the arc also place, sin_phi, nu
+        and captured (see `Section`).
         """
         n = len(self.walls) + 1
         found: dict[str, list[Any]] = {
@@ -227,13 +233,13 @@ class FollowedOrbit:
 
 
 def describe(scene: Scene, *, energy: float, seed: int | None) -> dict[str, Any]:
-    """Return what goes with a table of particles: the scene, their initial energy, seed and version."""
+    """Return what goes with a table of particles: scene, initial energy, seed and version."""
     found = {"version": __version__, "scene": scenes.to_data(scene), "energy": energy}
     return found if seed is None else {**found, "seed": seed}
 
 
 def usual_energy(scene: Scene, crossings: float = CROSSINGS) -> float:
-    """Return an energy at which a particle crosses the table this often in a cycle [length^2 / time^2]."""
+    """Return the energy for so many crossings of the table in a cycle [length^2 / time^2]."""
     check_scene(scene)
     size = float(table_at(fp, scene, 0.0).size)
     return 0.5 * (crossings * size / (scene.period or CROSSINGS * size)) ** 2
@@ -282,18 +288,22 @@ def follow(
     return found
 
 
-def from_state(scene: Scene, start: State, n_collisions: int, t_end: float = math.inf) -> FollowedOrbit:
+def from_state(
+    scene: Scene, start: State, n_collisions: int, t_end: float = math.inf
+) -> FollowedOrbit:
     """Follow a particle from a state of your own, as `fast.trajectory`.
 
     Raises:
         BadInput: naming field, value and bound.
     """
     found = fast.trajectory(scene, start, n_collisions, t_end)
-    return FollowedOrbit(scene, start, found.walls, np.asarray(found.steps, np.float64), found.outcome)
+    return FollowedOrbit(
+        scene, start, found.walls, np.asarray(found.steps, np.float64), found.outcome
+    )
 
 
 class Slot(NamedTuple):
-    """A wall's part of the boundary map: its name, and its begin and end along the boundary, 0 to 1."""
+    """A wall's part of the boundary map: name, begin and end along the boundary, 0 to 1."""
 
     wall: Wall
     begin: float
@@ -336,7 +346,7 @@ def stretches(now: TableAt) -> list[Stretch]:
 
 
 def boundary(scene: Scene) -> list[Slot]:
-    """Return the walls anticlockwise from the right end of the cap, by their mean lengths in a cycle."""
+    """Return the walls anticlockwise from the right end of the cap, with their mean lengths."""
     check_scene(scene)
     times = scene.period * np.arange(N_PHASES if scene.period else 1) / N_PHASES
     found = [stretches(table_at(fp, scene, t)) for t in times.tolist()]
@@ -347,14 +357,16 @@ def boundary(scene: Scene) -> list[Slot]:
 
 
 def boundary_map(orbit: FollowedOrbit) -> FloatArray:
-    """Return (n, 2): place along the boundary and sin of the angle to the normal after each collision.
+    """Return (n, 2): place along the boundary and sine to the normal after each collision.
 
-    The place runs anticlockwise, 0 to 1. Each wall has the part that `boundary` gives it, and a hit the
-    corresponding point of it. The sine is positive along that direction.
+    The place runs anticlockwise, 0 to 1. Each wall has the part that `boundary` gives it, and a hit
+    the corresponding point of it. The sine is positive along that direction.
     """
     slots = boundary(orbit.scene)
     out = np.empty((len(orbit.walls), 2))
-    for k, (wall, (_, t, x, y, vx, vy)) in enumerate(zip(orbit.walls, orbit.steps.tolist(), strict=True)):
+    for k, (wall, (_, t, x, y, vx, vy)) in enumerate(
+        zip(orbit.walls, orbit.steps.tolist(), strict=True)
+    ):
         now = table_at(fp, orbit.scene, t)
         own = [pair for pair in zip(slots, stretches(now), strict=True) if pair[0].wall == wall]
         slot, part = own[0 if x < 0 else -1]  # of the base beside a mouth the left part comes first

@@ -1,4 +1,4 @@
-"""What is shown while one waits: a bar or lines on stderr, and that the fast stepper is compiled."""
+"""What is shown while one waits: a bar or lines on stderr, and the news of a compilation."""
 
 import math
 import sys
@@ -10,11 +10,12 @@ from typing import Any
 from rich import progress
 from rich.console import Console
 
-FIRST, EVERY = 20.0, 60.0  # seconds to the first line, and between lines, where there is no terminal
+FIRST = 20.0  # seconds to the first line, where there is no terminal
+EVERY = 60.0  # seconds between lines
 CLOCK = time.monotonic
 UNITS = ((1.0, "seconds"), (60.0, "minutes"), (3600.0, "hours"), (86400.0, "days"))
-# The kernels of `fast.kernel` that take more than three seconds to compile, and how long a command waits in
-# all. `loop` is a step of the lanes.
+# The kernels of `fast.kernel` that take more than three seconds to compile, and how long a command
+# waits in all. `loop` is a step of the lanes.
 SLOW_TO_COMPILE = {
     "scalar_step": "about half a minute",
     "loop": "about half a minute",
@@ -45,7 +46,9 @@ def announce_compilation() -> Iterator[None]:
                 announced.add(duration)
                 what = f"compiling the fast stepper for this machine: {duration}"
                 is_kept = cache_folder(compiled) is not None
-                next_time = "kept for next time" if is_kept else "no folder can be written in to keep it"
+                next_time = (
+                    "kept for next time" if is_kept else "no folder can be written in to keep it"
+                )
                 print(f"{what}; {next_time}", file=sys.stderr, flush=True)
 
         def on_end(self, compilation: Any) -> None:
@@ -70,7 +73,7 @@ def progress_bar() -> progress.Progress:
 
 
 class Watch:
-    """Moves a bar on a terminal; elsewhere prints a line on stderr after 20 seconds, and then one a minute.
+    """Moves a bar on a terminal; elsewhere prints a line on stderr after 20 s, then one a minute.
 
     Args:
         bar: see `progress_bar`.
@@ -79,20 +82,33 @@ class Watch:
     """
 
     def __init__(self, bar: progress.Progress, name: str, unit: str) -> None:
-        self._bar, self._name, self._unit = bar, name, unit
+        self._bar = bar
+        self._name = name
+        self._unit = unit
         self._task = bar.add_task(name, total=None)
-        self._begin, self._n_before, self._next = math.nan, 0, math.inf
+        self._begin = math.nan
+        self._n_before = 0
+        self._next = math.inf
 
     def update(self, n_done: int, n_total: int) -> None:
-        """Take note of how many are done; the clock begins with the first call, when all is compiled."""
+        """Take note of how many are done.
+
+        The clock begins with the first call, when all is compiled.
+        """
         now = CLOCK()
         if math.isnan(self._begin):
-            self._begin, self._n_before, self._next = now, n_done, now + FIRST
+            self._begin = now
+            self._n_before = n_done
+            self._next = now + FIRST
         self._bar.update(self._task, completed=n_done, total=n_total)
         if self._bar.disable and now >= self._next:
             self._next = now + EVERY
             rate = (n_done - self._n_before) / max(now - self._begin, 1e-9)
-            left = f"{format_duration((n_total - n_done) / rate)} left" if rate else "time left unknown"
+            left = (
+                f"{format_duration((n_total - n_done) / rate)} left"
+                if rate
+                else "time left unknown"
+            )
             count = f"{n_done:,} of {n_total:,} {self._unit}"
             print(f"{self._name}: {count}, {left}", file=sys.stderr, flush=True)
 

@@ -1,11 +1,13 @@
-"""`mushrooms ask`, `attack` and `verify`: single questions, their proved answers, and answers of steppers.
+"""`mushrooms ask`, `attack` and `verify`: single questions, proved answers, answers of steppers.
 
-A question is a case of the test suite, a draw of a family of nasty questions, or a step of a trajectory.
+A question is a case of the test suite, a draw of a family of nasty questions, or a step of a
+trajectory.
 """
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,12 +39,32 @@ from scene.named import scene_named
 from scene.refusal import shown
 
 
-def ask_case(case: str, command: list[str] | None, seed: int | None, as_json: bool) -> int:
-    """Print a question with its answer and rule; ask a stepper too, if one is given; return the exit code."""
-    vector = _find(case, seed)
-    transform = Transform() if seed is None else draw_transform(vector, seed)
-    result = _put(command, vector, transform) if command else None
-    if as_json:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AskOptions:
+    """The options of `mushrooms ask`.
+
+    Attributes:
+        case: name of the question.
+        command: program and arguments of a stepper to ask.
+        seed: of the run that asked the question; None for the question as published.
+        as_json: print JSON.
+    """
+
+    case: str
+    command: Sequence[str] | None
+    seed: int | None
+    as_json: bool
+
+
+def ask_case(options: AskOptions) -> int:
+    """Print a question with its answer and rule.
+
+    Ask a stepper too, if one is given; return the exit code.
+    """
+    vector = _find(options.case, options.seed)
+    transform = Transform() if options.seed is None else draw_transform(vector, options.seed)
+    result = _put(options.command, vector, transform) if options.command else None
+    if options.as_json:
         print(msgspec.json.format(msgspec.json.encode(vector), indent=1).decode())
     else:
         _show(vector, transform)
@@ -74,12 +96,13 @@ def _show(vector: vectors.Vector, transform: Transform) -> None:
     console.print(f"rule       {escape(vector.rule)}")
     console.print(f"source     {escape(vector.source)}")
     if str(transform) != str(type(transform)()):
-        console.print(f"asked      {transform}; certified answers below are of the question as published")
+        console.print(
+            f"asked      {transform}; certified answers below are of the question as published"
+        )
     console.print(f"question   {escape(json.dumps(vectors.request(transform.apply(vector), 0)))}")
     for i, expectation in enumerate(vector.expect):
-        console.print(
-            f"{'certified' if i == 0 else 'or'}  {expectation.outcome} {expectation.reason}".rstrip()
-        )
+        head = "certified" if i == 0 else "or"
+        console.print(f"{head}  {expectation.outcome} {expectation.reason}".rstrip())
         for number, outcome in enumerate(middle(expectation, vector.state), 1):
             console.print(f"  {number:>4}  {escape(format_outcome(msgspec.to_builtins(outcome)))}")
         for begin, end in expectation.stays:
@@ -88,7 +111,7 @@ def _show(vector: vectors.Vector, transform: Transform) -> None:
     console.print(f"verifier   {verdict.status} {escape(verdict.reason)}".rstrip())
 
 
-def _put(command: list[str], vector: vectors.Vector, transform: Transform) -> Result:
+def _put(command: Sequence[str], vector: vectors.Vector, transform: Transform) -> Result:
     with Session(command) as session:
         try:
             session.start()
@@ -101,31 +124,56 @@ def _put(command: list[str], vector: vectors.Vector, transform: Transform) -> Re
 SLOWEST = 10.0  # seconds that one question may take the reference: its work is bounded
 
 
-def attack_steppers(family: str, cases: int, seed: int, stepper: str, json_file: Path | None) -> int:
-    """Ask steppers the questions of one family or of all, print the counts, and return the exit code."""
-    if stepper not in STEPPERS:
-        raise BadInput(f"--stepper = {stepper!r}, must be one of {', '.join(STEPPERS)}")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttackOptions:
+    """The options of `mushrooms attack`.
+
+    Attributes:
+        family: name of a family of questions, or all.
+        cases: of each family.
+        seed: of the questions.
+        stepper: reference, fast or both.
+        json_file: file for the counts and the wrong cases.
+    """
+
+    family: str
+    cases: int
+    seed: int
+    stepper: str
+    json_file: Path | None
+
+
+def attack_steppers(options: AttackOptions) -> int:
+    """Ask steppers the questions of one family or of all; print counts, return the exit code."""
+    if options.stepper not in STEPPERS:
+        raise BadInput(f"--stepper = {options.stepper!r}, must be one of {', '.join(STEPPERS)}")
+    family = options.family
     names = list(FAMILIES) if family == "all" else [family]
     if family != "all" and family not in FAMILIES:
         raise BadInput(f"--family = {family!r}, must be all or one of {', '.join(FAMILIES)}")
-    check_file(json_file, (".json",))
+    check_file(options.json_file, (".json",))
     with announce_compilation(), progress_bar() as bar:
-        task = bar.add_task("attack", total=cases * len(names))
+        task = bar.add_task("attack", total=options.cases * len(names))
         tallies = run(
             [FAMILIES[name] for name in names],
-            cases,
-            seed,
-            STEPPERS[stepper],
+            options.cases,
+            options.seed,
+            STEPPERS[options.stepper],
             progress=lambda _: bar.advance(task),
         )
     _print(tallies)
-    if json_file is not None:
-        write_file(json_file, json.dumps([_row(tally) for tally in tallies], indent=1) + "\n")
+    if options.json_file is not None:
+        write_file(
+            options.json_file, json.dumps([_row(tally) for tally in tallies], indent=1) + "\n"
+        )
     return int(any(tally.cases["wrong"] or tally.slowest > SLOWEST for tally in tallies))
 
 
 def count_hits(scene: Scene, state: State, t_end: float) -> dict[str, int] | None:
-    """Return how often the lanes meet each wall up to t_end; None where a flow is undecided or refused."""
+    """Return how often the lanes meet each wall up to t_end.
+
+    None where a flow is undecided or refused.
+    """
     try:
         carried = fast.flow(scene, [state], t_end)
     except BadInput:
@@ -155,11 +203,17 @@ def _row(tally: Any) -> dict[str, Any]:
 
 def _print(tallies: list[Any]) -> None:
     heads = ("cases", "agreed", "undecided", "refused", "open", "wrong", "worst ulps", "slowest s")
-    table = Table(Column("family", no_wrap=True), *heads, title="Attacks: verdicts of all steppers asked")
+    table = Table(
+        Column("family", no_wrap=True), *heads, title="Attacks: verdicts of all steppers asked"
+    )
     for tally in tallies:
         counts = [str(count) for count in tally.counts.values()]
         table.add_row(
-            tally.family, str(tally.n_cases), *counts, f"{tally.worst_ulps:.3g}", f"{tally.slowest:.2f}"
+            tally.family,
+            str(tally.n_cases),
+            *counts,
+            f"{tally.worst_ulps:.3g}",
+            f"{tally.slowest:.2f}",
         )
     print_table(new_console(), table)
     for tally in tallies:
@@ -171,25 +225,46 @@ def _print(tallies: list[Any]) -> None:
 FIELDS = ("t", "x", "y", "vx", "vy")
 
 
-def verify_file(
-    file: Path, scene: str | None, picture: Path | None, t_end: float | None, within: float, is_all: bool
-) -> int:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerifyOptions:
+    """The options of `mushrooms verify`.
+
+    Attributes:
+        file: of the trajectory.
+        scene: of a CSV file; None for a file that has its own.
+        picture: file for a picture of the first false step.
+        t_end: horizon, where the file gives none [time].
+        within: largest backward error that agrees, in units of 2^-53.
+        is_all: judge what follows a false step, too.
+    """
+
+    file: Path
+    scene: str | None
+    picture: Path | None
+    t_end: float | None
+    within: float
+    is_all: bool
+
+
+def verify_file(options: VerifyOptions) -> int:
     """Judge a trajectory, each step from the state before it, and return the exit code."""
+    file = options.file
+    picture = options.picture
     check_file(picture, (".svg",))
     label = f"trajectory {str(file)!r}"
-    if (file.suffix == ".csv") != (scene is not None):
+    if (file.suffix == ".csv") != (options.scene is not None):
         raise BadInput(f"{label}: a CSV file needs --scene, a JSON file has its own")
-    if within < 0 or not math.isfinite(within):
-        raise BadInput(f"--within = {within}, must be a finite number >= 0")
+    if options.within < 0 or not math.isfinite(options.within):
+        raise BadInput(f"--within = {options.within}, must be a finite number >= 0")
     try:
-        if scene is None:
-            answers = verifier.read_answers(str(file), t_end=t_end)
+        if options.scene is None:
+            answers = verifier.read_answers(str(file), t_end=options.t_end)
         else:
-            head, rows = _of_rows(file, label, scene)
+            head, rows = _of_rows(file, label, options.scene)
             steps = ((f"step {number}", row) for number, row in enumerate(rows, 1))
-            answers = verifier.build_answers(head, t_end, steps)
-        report = verifier.Report(within)
-        false = _judge(answers, report, is_all)
+            answers = verifier.build_answers(head, options.t_end, steps)
+        report = verifier.Report(options.within)
+        false = _judge(answers, report, options.is_all)
     except ValueError as error:
         raise BadInput(f"{label}: {error}") from None
     if not report.n_steps:
@@ -205,7 +280,10 @@ def verify_file(
 def _judge(
     answers: verifier.Answers, report: verifier.Report, is_all: bool
 ) -> tuple[str, dict[str, Any], dict[str, Any]] | None:
-    """Judge steps, print those that do not agree, and return the first false one: place, start, answer."""
+    """Judge steps and print those that do not agree.
+
+    The first false one is returned: place, start, answer.
+    """
     seen = [answers.state]
 
     def remembered() -> Iterator[tuple[str, Any]]:
@@ -239,7 +317,9 @@ def _of_rows(file: Path, label: str, scene: str) -> tuple[dict[str, Any], list[d
         numbers = {name: read_number(place, name, row[name]) for name in FIELDS}
         if states and row["wall"] not in of.walls:
             given = shown(row["wall"]) if row["wall"] else "empty"
-            raise BadInput(f"{place}: wall is {given}, must be the wall that was hit: {', '.join(of.walls)}")
+            raise BadInput(
+                f"{place}: wall is {given}, must be the wall that was hit: {', '.join(of.walls)}"
+            )
         states.append({**numbers, "wall": row["wall"] or None})
     if not states:
         raise BadInput(f"{label}: there is no row")

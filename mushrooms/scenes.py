@@ -1,8 +1,9 @@
-"""`mushrooms scenes` and `theory`: the catalogue, a scene as a file, what theory predicts for one cycle."""
+"""`mushrooms scenes` and `theory`: the catalogue, a scene as a file, theory for one cycle."""
 
 import json
 import math
 import sys
+from dataclasses import dataclass
 from typing import Any
 
 from rich.table import Column, Table
@@ -17,28 +18,55 @@ from scene.load import catalogue_text, read_data
 from scene.named import SCENES, scene_named
 
 
-def print_scenes(name: str, as_toml: bool, as_json: bool) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenesOptions:
+    """The options of `mushrooms scenes`.
+
+    Attributes:
+        name: of a scene; empty for all of the catalogue.
+        as_toml: print it as a scene file.
+        as_json: print JSON.
+    """
+
+    name: str
+    as_toml: bool
+    as_json: bool
+
+
+def print_scenes(options: ScenesOptions) -> None:
     """Print the catalogue, or one scene of it or of the audit."""
-    if as_toml and as_json:
+    name = options.name
+    if options.as_toml and options.as_json:
         raise BadInput("--toml and --json: must be one of them")
-    if as_toml and not name:
+    if options.as_toml and not name:
         raise BadInput(f"--toml needs NAME, one of {', '.join(scenes.catalogue())}")
-    of_audit = scenes.to_data(SCENES[name]) if name in SCENES else None
-    if name and not as_json:
-        print((_toml(of_audit) if of_audit else catalogue_text(name)).rstrip("\n"))
+    if name:
+        print(_one_scene(name, options.as_json))
         return
-    rows = [] if name else [_catalogue_row(each) for each in scenes.catalogue()]
-    if as_json:
-        print(json.dumps(rows or of_audit or read_data(name), indent=2, ensure_ascii=False))
+    rows = [_catalogue_row(each) for each in scenes.catalogue()]
+    if options.as_json:
+        print(json.dumps(rows, indent=2, ensure_ascii=False))
         return
     table = Table(Column("name", no_wrap=True), "table", "period", "notes", title="Catalogue")
     for row in rows:
-        length = (
-            "refused" if row["refused"] else "static" if row["period"] is None else f"{row['period']:.6g}"
-        )
-        notes = f"Refused: {row['refused']}" if row["refused"] else row["notes"]
-        table.add_row(row["name"], row["table"], length, notes)
+        table.add_row(row["name"], row["table"], *_period_and_notes(row))
     print_table(new_console(), table)
+
+
+def _one_scene(name: str, as_json: bool) -> str:
+    """Return a scene of the catalogue or of the audit as TOML or JSON."""
+    of_audit = scenes.to_data(SCENES[name]) if name in SCENES else None
+    if as_json:
+        return json.dumps(of_audit or read_data(name), indent=2, ensure_ascii=False)
+    return (_toml(of_audit) if of_audit else catalogue_text(name)).rstrip("\n")
+
+
+def _period_and_notes(row: dict[str, Any]) -> tuple[str, str]:
+    """Return what the table of the catalogue has in its last columns."""
+    if row["refused"]:
+        return "refused", f"Refused: {row['refused']}"
+    length = "static" if row["period"] is None else f"{row['period']:.6g}"
+    return length, row["notes"]
 
 
 def _toml(data: dict[str, Any]) -> str:
@@ -86,23 +114,50 @@ FIGURES = {
 }
 
 
-def print_prediction(scene: str, digits: int, energy: float | None, as_json: bool) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TheoryOptions:
+    """The options of `mushrooms theory`.
+
+    Attributes:
+        scene: a name or a file.
+        digits: correct digits.
+        energy: initial energy to predict for, too; None for none.
+        as_json: print JSON.
+    """
+
+    scene: str
+    digits: int
+    energy: float | None
+    as_json: bool
+
+
+def print_prediction(options: TheoryOptions) -> None:
     """Print what the theory predicts for one cycle, and at an energy if one is given."""
-    found = scene_named(scene)
+    found = scene_named(options.scene)
     with progress_bar() as bar:
         task = bar.add_task("resolution 1 of two or more", total=100)
 
         def advance(number: int, share: float) -> None:
-            bar.update(task, completed=round(100 * share), description=f"resolution {number} of two or more")
+            bar.update(
+                task,
+                completed=round(100 * share),
+                description=f"resolution {number} of two or more",
+            )
 
-        pairs: dict[str, Any] = dict(theory.predict(found, digits, progress=advance).strings(digits))
-    pairs |= _at_energy(found, energy) if energy is not None else {}
-    print_pairs(pairs, as_json, FIGURES)
+        predicted = theory.predict(found, options.digits, progress=advance)
+    pairs: dict[str, Any] = dict(predicted.strings(options.digits))
+    if options.energy is not None:
+        pairs |= _at_energy(found, options.energy)
+    print_pairs(pairs, options.as_json, FIGURES)
 
 
 def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
-    """Return the figures of one cycle at an initial energy; where there are none, say why on stderr."""
-    speed, n_collisions = math.sqrt(2 * energy), expected_collisions(scene, energy, 1)
+    """Return the figures of one cycle at an initial energy.
+
+    Where there are none, say why on stderr.
+    """
+    speed = math.sqrt(2 * energy)
+    n_collisions = expected_collisions(scene, energy, 1)
     first: dict[str, float | bool | None] = {
         "energy": energy,
         "v": float(f"{speed:.7g}"),
@@ -113,7 +168,8 @@ def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
     except theory.NotCovered as reason:
         print(f"{reason}. What is printed is the limit of high energies", file=sys.stderr)
         return first
-    (peak, variance), left = found.peak, found.theory_error
+    peak, variance = found.peak
+    left = found.theory_error
     figures = {
         "p_nc_at": found.p_nc,
         "m1_at": found.mean_s,
@@ -127,5 +183,7 @@ def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
         "peak_width_error": variance**0.5 * left.variance / 2,
     }
     digits = {name: 2 if name.endswith("_error") else 7 for name in figures}
-    rounded = {name: x if x is None else float(f"{x:.{digits[name]}g}") for name, x in figures.items()}
+    rounded = {
+        name: x if x is None else float(f"{x:.{digits[name]}g}") for name, x in figures.items()
+    }
     return {**first, **rounded, "is_in_reach": left.variance < 0.5}

@@ -4,6 +4,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,14 @@ from mushrooms.progress import Watch, announce_compilation, progress_bar
 from mushrooms.store import conduct
 from mushrooms.store.run import StoredRun
 from mushrooms.store.spec import RunSpec
-from mushrooms.store.summary import RunTally, careful_note, explain_limit, gain_of, measured, tally_of
+from mushrooms.store.summary import (
+    RunTally,
+    careful_note,
+    explain_limit,
+    gain_of,
+    measured,
+    tally_of,
+)
 from scene import BadInput
 from scene.files.writer import named, write_file
 from scene.mouth import one_cycle
@@ -29,67 +37,83 @@ from scene.refusal import refuse_unheeded
 Gains = Callable[[], Iterable[Any]]  # returns ln(E/E0) after each cycle, block by block
 MOST_IN_MEMORY = 10**8  # particles
 LIMITED = 3  # exit code of a run that a limit has stopped
-NO_BLOCK = "no block was finished: raise the limit, or begin in another folder with a smaller --block"
+NO_BLOCK = (
+    "no block was finished: raise the limit, or begin in another folder with a smaller --block"
+)
 
 
-def simulate_scene(
-    scene: str,
-    particles: int,
-    energy: float,
-    cycles: int,
-    seed: int,
-    phases: str | None,
-    out: Path | None,
-    resume: bool,
-    dask: str | None,
-    block: int | None,
-    max_collisions: int | None,
-    max_seconds: float | None,
-    plot: Path | None,
-    threads: int | None,
-    as_json: bool,
-) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulateOptions:
+    """The options of `mushrooms simulate`.
+
+    Attributes:
+        scene: a name or a file.
+        particles, energy, cycles, seed: of the ensemble.
+        phases: fractions of a cycle, separated by commas; None for none.
+        out: folder for the run; None to keep nothing.
+        resume: go on with the run in the folder.
+        dask: address of a scheduler; None to compute in this process.
+        block: particles stored at a time; None for some seconds of work.
+        max_collisions, max_seconds: where a run stops; None for no limit.
+        plot: file for a picture of the energies.
+        threads: None for all cores, or one for each block of a cluster.
+        as_json: print JSON.
+    """
+
+    scene: str
+    particles: int
+    energy: float
+    cycles: int
+    seed: int
+    phases: str | None
+    out: Path | None
+    resume: bool
+    dask: str | None
+    block: int | None
+    max_collisions: int | None
+    max_seconds: float | None
+    plot: Path | None
+    threads: int | None
+    as_json: bool
+
+
+def simulate_scene(options: SimulateOptions) -> None:
     """Simulate an ensemble, in memory or in a folder, and print its summary."""
-    if out is None:
-        if particles > MOST_IN_MEMORY:
-            raise BadInput(f"--particles = {particles}, must be 1 to {MOST_IN_MEMORY}; more need --out")
-        refuse_unheeded(
-            {
-                "--phases": phases,
-                "--resume": resume or None,
-                "--dask": dask,
-                "--block": block,
-                "--max-collisions": max_collisions,
-                "--max-seconds": max_seconds,
-            },
-            "it needs --out, as without a folder nothing is kept",
-        )
-    if plot is not None and particles < 2:
-        raise BadInput(f"--particles = {particles}, must be >= 2 for --plot")
-    check_file(plot, (".svg", ".png"))
-    spec = RunSpec(scene_named(scene), energy, cycles, seed, _phases(phases))
-    name = spec.scene.name or scene
-    if out is None:
-        summary, gains = _in_memory(spec, name, particles, threads)
+    if options.out is None:
+        _check_unstored(options)
+    if options.plot is not None and options.particles < 2:
+        raise BadInput(f"--particles = {options.particles}, must be >= 2 for --plot")
+    check_file(options.plot, (".svg", ".png"))
+    scene = scene_named(options.scene)
+    spec = RunSpec(scene, options.energy, options.cycles, options.seed, _phases(options.phases))
+    if options.out is None:
+        summary, gains = _in_memory(spec, options)
     else:
-        engine: conduct.Engine = (
-            partial(conduct.by_dask, address=dask, threads=threads)
-            if dask
-            else partial(conduct.in_process, threads=threads)
-        )
-        default = conduct.block_of_new(spec, particles, threads or os.cpu_count() or 1)
-        with writable_folder(out), locked(out):
-            with named(out), announce_compilation():
-                run = conduct.open_or_create(out, spec, particles, block, default, scene, resume)
-            complete = partial(
-                conduct.complete, run, engine, max_collisions=max_collisions, max_seconds=max_seconds
-            )
-            summary, gains = _on_disk(run, name, complete)
-    print_pairs(summary, as_json)
+        summary, gains = _in_folder(options.out, spec, options)
+    print_pairs(summary, options.as_json)
     tell(careful_note(summary))
     tell(explain_limit(spec, summary))
-    if plot is not None:
-        draw_energies(plot, spec, iter(gains()), particles)
+    if options.plot is not None:
+        draw_energies(options.plot, spec, iter(gains()), options.particles)
+
+
+def _check_unstored(options: SimulateOptions) -> None:
+    """Refuse what only a run in a folder can have."""
+    if options.particles > MOST_IN_MEMORY:
+        raise BadInput(
+            f"--particles = {options.particles}, must be 1 to {MOST_IN_MEMORY}; more need --out"
+        )
+    refuse_unheeded(
+        {
+            "--phases": options.phases,
+            "--resume": options.resume or None,
+            "--dask": options.dask,
+            "--block": options.block,
+            "--max-collisions": options.max_collisions,
+            "--max-seconds": options.max_seconds,
+        },
+        "it needs --out, as without a folder nothing is kept",
+    )
 
 
 def _phases(text: str | None) -> tuple[float, ...]:
@@ -101,24 +125,56 @@ def _phases(text: str | None) -> tuple[float, ...]:
         raise BadInput(f"--phases = {text}, must be numbers that rise and lie in (0, 1)") from None
 
 
-def _in_memory(
-    spec: RunSpec, name: str, n_particles: int, threads: int | None
-) -> tuple[dict[str, Any], Gains]:
+def _in_memory(spec: RunSpec, options: SimulateOptions) -> tuple[dict[str, Any], Gains]:
     """Follow an ensemble that is not stored; return its summary and its gains."""
+    n_particles = options.particles
     with announce_compilation(), progress_bar() as bar:
+        watch = Watch(bar, spec.scene.name or options.scene, "particles")
         found = fast.simulate(
             spec.scene,
             n_particles=n_particles,
             energy=spec.energy,
             n_cycles=spec.n_cycles,
             seed=spec.seed,
-            threads=threads,
-            progress=partial(Watch(bar, name, "particles").update, n_total=n_particles),
+            threads=options.threads,
+            progress=partial(watch.update, n_total=n_particles),
         )
     with np.errstate(divide="ignore"):
         gains = np.log(found.cycle_energies[found.takes_part()] / spec.energy)
     seconds = found.seconds * found.threads
-    return _summary(spec, tally_of(found), seconds, lambda: [gains], found.sha256()), lambda: [gains]
+    return _summary(spec, tally_of(found), seconds, lambda: [gains], found.sha256()), lambda: [
+        gains
+    ]
+
+
+def _in_folder(
+    folder: Path, spec: RunSpec, options: SimulateOptions
+) -> tuple[dict[str, Any], Gains]:
+    """Follow an ensemble in a folder that is held meanwhile; return its summary and its gains."""
+    threads = options.threads
+    engine: conduct.Engine = partial(conduct.in_process, threads=threads)
+    if options.dask:
+        engine = partial(conduct.by_dask, address=options.dask, threads=threads)
+    default = conduct.block_of_new(spec, options.particles, threads or os.cpu_count() or 1)
+    with writable_folder(folder), locked(folder):
+        with named(folder), announce_compilation():
+            run = conduct.open_or_create(
+                folder,
+                spec,
+                options.particles,
+                options.block,
+                default,
+                options.scene,
+                options.resume,
+            )
+        complete = partial(
+            conduct.complete,
+            run,
+            engine,
+            max_collisions=options.max_collisions,
+            max_seconds=options.max_seconds,
+        )
+        return _on_disk(run, spec.scene.name or options.scene, complete)
 
 
 def _on_disk(
@@ -129,7 +185,9 @@ def _on_disk(
     try:
         with named(run.folder):
             with announce_compilation(), progress_bar() as bar:
-                complete(partial(Watch(bar, name, "particles").update, n_total=run.shape.n_particles))
+                complete(
+                    partial(Watch(bar, name, "particles").update, n_total=run.shape.n_particles)
+                )
             summary = _summary(run.spec, run.tally, run.seconds, run.gains, run.sha256())
     except conduct.LimitReached as limit:
         tell(f"{limit}: {_how_to_resume(run)}")
@@ -153,7 +211,9 @@ def _how_to_resume(run: StoredRun) -> str:
     return f"{kept}; go on with: {run.command}"
 
 
-def _summary(spec: RunSpec, tally: RunTally, seconds: float, gains: Gains, sha256: str) -> dict[str, Any]:
+def _summary(
+    spec: RunSpec, tally: RunTally, seconds: float, gains: Gains, sha256: str
+) -> dict[str, Any]:
     flown = tally.followed * spec.n_cycles * one_cycle(spec.scene)
     return {
         "particles": tally.particles,
@@ -175,7 +235,7 @@ def tell(note: str | None) -> None:
 
 
 def draw_energies(path: Path, spec: RunSpec, gains: Iterator[Any], n_particles: int) -> None:
-    """Write the histogram of ln(E1/E0) of those that take part; of several cycles the mean after each, too.
+    """Write the histogram of ln(E1/E0) of those that take part, and means by cycle if several.
 
     Raises:
         BadInput: they are too few.

@@ -17,11 +17,10 @@ from typing import Any, NamedTuple
 from reference import rational
 from reference.arithmetic import Exhausted, Interval, Undecidable, exact_ends, is_below, sign
 from reference.isolation import Isolator
+from reference.prepared import PreparedTable
 from reference.walls import MovingWalls
-from scene import Cap, Mushroom, Scene, State, Stem, Undefined, Wall
-from scene.laws import bounds
+from scene import State, Undefined, Wall
 from scene.mpmath_internals import ends
-from scene.tables import laws
 
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
 BEYOND = 2.0**-10  # how far past the end of a search f is still looked at, as a share of its length
@@ -41,7 +40,7 @@ class Course:
     """A flight, and the questions about it.
 
     Attributes:
-        scene: table and laws.
+        table: the scene, prepared.
         motion: the walls along the flight, at the working precision.
         leaving: the wall the particle is on, if any, with its residual f(0).
         is_flat: on that wall f'(0) = 0 and f''(0) > 0, both exactly.
@@ -50,7 +49,7 @@ class Course:
         exact: the state as binary64 numbers, when it is one; decides ties.
     """
 
-    scene: Scene
+    table: PreparedTable
     motion: MovingWalls
     leaving: dict[Wall, Interval]
     is_flat: bool
@@ -60,7 +59,8 @@ class Course:
 
     def __post_init__(self) -> None:
         """Enclose the horizon and the start; nothing is proved yet."""
-        self.arithmetic, self.flight = self.motion.arithmetic, self.motion.flight
+        self.arithmetic = self.motion.arithmetic
+        self.flight = self.motion.flight
         self.horizon = self.arithmetic.dyadic(Fraction(FOR_EVER) if self.end is None else self.end)
         self.start = self.arithmetic.lower(self.flight.begin)
         self._searches: dict[Wall, Isolator] = {}
@@ -87,7 +87,7 @@ class Course:
 
     def _runs_along_mouth(self) -> bool:
         is_level = self.exact is not None and self.exact.y == 0 and self.exact.vy == 0
-        return isinstance(self.scene, Mushroom) and is_level and not self.leaving
+        return self.table.is_mushroom and is_level and not self.leaving
 
     def _along_mouth(self) -> Undefined | None:
         """Follow a path along y = 0 inside the mouth: it can only end at the mouth's edge."""
@@ -123,7 +123,7 @@ class Course:
 
     def _beyond_crossing(self, crossing: Interval) -> Hit | Undefined | None:
         """Continue a flight that met nothing before y = 0: to the base, or through the mouth."""
-        if isinstance(self.scene, Cap):
+        if self.table.is_cap:
             return self._base_hit(crossing)
         x = self.flight.x + self.flight.vx * crossing
         w = self.motion.width(crossing).f
@@ -133,7 +133,7 @@ class Course:
             return self._base_hit(crossing)
         if signs != [1, 1]:
             return self._at_the_edge()
-        if isinstance(self.scene, Stem):
+        if self.table.is_stem:
             return self._base_hit(crossing)
         found = self._first_hit(SIDES if self.in_cap else ("arc",), self.arithmetic.lower(crossing), None)
         if isinstance(found, Hit) and not is_below(crossing, found.time):
@@ -142,19 +142,19 @@ class Course:
 
     def _at_the_edge(self) -> Undefined:
         """Judge a crossing of y = 0 that may or may not lie between the sides."""
-        is_mouth = isinstance(self.scene, Mushroom)
+        is_mouth = self.table.is_mushroom
         instant = None if self.exact is None else rational.crossing_time(self.exact)
         if (
             self.exact is not None
             and instant is not None
-            and any(rational.is_zero(self.scene, self.exact, side, instant) for side in SIDES[:2])
+            and any(rational.is_zero(self.table, self.exact, side, instant) for side in SIDES[:2])
         ):
             return Undefined("mouth-edge" if is_mouth else "corner")
         edge = "the mouth's edge" if is_mouth else "a corner"
         raise Undecidable(f"{edge} is met, as far as this precision shows")
 
     def _base_hit(self, crossing: Interval) -> Hit:
-        return Hit("base", crossing, -self.flight.vy if isinstance(self.scene, Stem) else self.flight.vy)
+        return Hit("base", crossing, -self.flight.vy if self.table.is_stem else self.flight.vy)
 
     def _first_hit(
         self, walls: tuple[Wall, ...], start: Interval, limit: Interval | None
@@ -182,7 +182,9 @@ class Course:
         hits: list[Hit] = []
         postponed: list[Wall]
         for stop in self._stops(start, self.horizon if limit is None else limit):
-            until, hits, postponed = stop, [], []
+            until = stop
+            hits = []
+            postponed = []
             for wall in itertools.chain(walls, postponed):
                 try:
                     hit = self._hit(wall, start, until, self._searches)
@@ -202,7 +204,9 @@ class Course:
     def _stops(self, start: Interval, until: Interval) -> Iterator[Interval]:
         """Yield later and later ends of a search, first after one period: an early hit stays cheap."""
         upper = self.arithmetic.upper
-        farthest, last, length = self._escape_time(), upper(until), self.motion.timeline.turn
+        farthest = self._escape_time()
+        last = upper(until)
+        length = self.motion.timeline.turn
         if farthest is not None and is_below(farthest, last):
             last = farthest
         while length is not None and is_below(upper(start + length), last):
@@ -214,7 +218,7 @@ class Course:
         """Tell whether a hit is known to fall on the horizon exactly."""
         if self.exact is None or self.end is None or is_below(hit.time, self.horizon):
             return False
-        return rational.is_zero(self.scene, self.exact, hit.wall, self.end)
+        return rational.is_zero(self.table, self.exact, hit.wall, self.end)
 
     def _require_before_end(self, hit: Hit) -> None:
         if not is_below(hit.time, self.horizon):
@@ -230,14 +234,14 @@ class Course:
         for instant in times:
             walls = self._met_at(instant, hits, limit)
             if len(walls) > 1:
-                is_edge = isinstance(self.scene, Mushroom) and "base" in walls and "arc" not in walls
+                is_edge = self.table.is_mushroom and "base" in walls and "arc" not in walls
                 return Undefined("mouth-edge" if is_edge else "corner")
         raise Undecidable("two walls are met together, as far as this precision shows")
 
     def _rational_times(self, state: State) -> list[Fraction]:
         """List the flight times, before the horizon, at which straight walls that stand still are met."""
         times = [rational.crossing_time(state)]
-        times += [rational.straight_time(self.scene, state, wall) for wall in SIDES]
+        times += [rational.straight_time(self.table, state, wall) for wall in SIDES]
         return [time for time in times if time is not None and (self.end is None or time < self.end)]
 
     def _met_at(self, instant: Fraction, hits: list[Hit], limit: Interval | None) -> tuple[Wall, ...]:
@@ -251,7 +255,7 @@ class Course:
             met += ["base"] if crossing == instant else []
         for hit in hits:
             low, high = exact_ends(hit.time)
-            is_met = low <= instant <= high and rational.is_zero(self.scene, self.exact, hit.wall, instant)
+            is_met = low <= instant <= high and rational.is_zero(self.table, self.exact, hit.wall, instant)
             if is_met:
                 met.append(hit.wall)
             elif low <= instant:
@@ -302,13 +306,16 @@ class Course:
 
     def _is_never_met(self, wall: Wall, s: Interval) -> bool:
         """Tell whether a wall never comes, in a whole period, to where the flight is at s."""
-        turn, motion = self.motion.timeline.turn, self.motion.at_rest(s)
+        turn = self.motion.timeline.turn
+        motion = self.motion.at_rest(s)
         if turn is None:
             return False
         place = wall, ends(motion.flight.x), ends(motion.flight.y)
         if place not in self._never_met:
-            arithmetic, start = self.arithmetic, self.arithmetic.zero
-            jet, before = partial(motion.wall, wall), arithmetic.number(-1)
+            arithmetic = self.arithmetic
+            start = self.arithmetic.zero
+            jet = partial(motion.wall, wall)
+            before = arithmetic.number(-1)
             search = Isolator(arithmetic, jet, before, self.leaving.get(wall), timeline=self.motion.timeline)
             try:
                 is_clear = sign(search.value(start)) > 0 and search.first_fall(start, turn) is None
@@ -324,14 +331,14 @@ class Course:
 
         It is twice the time to cross the largest extent the table ever has, along either axis.
         """
-        tops = {name: bounds(law) for name, law in laws(self.scene).items()}
-        radius = tops["r"].highest if "r" in tops else 0.0
-        depth = tops["h"].highest if "h" in tops else 0.0
-        tilt = max(abs(tops["slope"].lowest), abs(tops["slope"].highest)) if "slope" in tops else 0.0
-        number, upper = self.arithmetic.number, self.arithmetic.upper
-        half = number(max(radius, tops["w"].highest if "w" in tops else 0.0)) + number(tilt) * number(depth)
+        number = self.arithmetic.number
+        upper = self.arithmetic.upper
+        radius = number(self.table.radius)
+        depth = number(self.table.depth)
+        widest = max(self.table.radius, self.table.half_width)
+        half = number(widest) + number(self.table.tilt) * depth
         times = []
-        for speed, extent in ((self.flight.vx, 2 * half), (self.flight.vy, number(radius) + number(depth))):
+        for speed, extent in ((self.flight.vx, 2 * half), (self.flight.vy, radius + depth)):
             if sign(speed) != 0:
                 size = speed if sign(speed) > 0 else -speed
                 times.append(upper(2 * extent / size))

@@ -34,7 +34,7 @@ def measure(course: Course, hit: Hit) -> Margins:
 
 def neighbours(course: Course, wall: Wall) -> tuple[Wall, ...]:
     """Return the walls that bound the part of the table in which this wall is met."""
-    present = course.scene.walls
+    present = course.table.walls
     if wall == "arc" or (wall == "base" and "arc" in present):
         return ("arc", "base")
     return SIDES if "arc" in present else ("base", *SIDES)
@@ -42,7 +42,8 @@ def neighbours(course: Course, wall: Wall) -> tuple[Wall, ...]:
 
 def distance(course: Course, hit: Hit, wall: Wall) -> Interval:
     """Enclose f / |grad f| of a wall at the hit."""
-    motion, arithmetic = course.motion, course.arithmetic
+    motion = course.motion
+    arithmetic = course.arithmetic
     f_x, f_y, _ = motion.gradient(wall, hit.time)
     length = arithmetic.context.sqrt(arithmetic.square(f_x) + arithmetic.square(f_y))
     return motion.wall(wall, hit.time).f / length

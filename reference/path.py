@@ -22,6 +22,7 @@ from reference.arithmetic import Arithmetic, Exhausted, Interval, Undecidable, W
 from reference.course import FOR_EVER, Course, Hit
 from reference.jacobian import chained, enclosures, identity, step_jacobian
 from reference.margins import measure
+from reference.prepared import PreparedTable, prepare
 from reference.start import depart
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import (
@@ -29,7 +30,6 @@ from scene import (
     Rejected,
     Scene,
     State,
-    Stem,
     Undecided,
     Undefined,
     check_count,
@@ -73,11 +73,13 @@ def next_collision(
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1. Method: isolate, exclude, refine.
     """
     digits = checked_digits(scene, digits)
-    work, least = WorkLimit(), digits + GUARD_DIGITS
+    table = prepare(scene)
+    least = digits + GUARD_DIGITS
+    work = WorkLimit()
 
     def follow(working: int) -> Trajectory:
         arithmetic = Arithmetic(working, work)
-        return _follow(arithmetic, scene, state, t_end, 1, digits, is_differentiated, is_measured)
+        return _follow(arithmetic, table, state, t_end, 1, digits, is_differentiated, is_measured)
 
     try:
         state = check_numbers(scene, state, t_end)
@@ -118,12 +120,13 @@ def trajectory(
     if t_end is not None:
         t_end = check_number("t_end", t_end)
     state = check_numbers(scene, state, sys.float_info.max if t_end is None else t_end)
+    table = prepare(scene)
     if working is not None:
         working = check_count("working", working, 1, MAX_DIGITS)
-        return _follow(Arithmetic(working), scene, state, t_end, n_collisions, None, is_differentiated)
+        return _follow(Arithmetic(working), table, state, t_end, n_collisions, None, is_differentiated)
 
     def follow(digits_now: int) -> Trajectory:
-        return _follow(Arithmetic(digits_now), scene, state, t_end, n_collisions, digits, is_differentiated)
+        return _follow(Arithmetic(digits_now), table, state, t_end, n_collisions, digits, is_differentiated)
 
     most = 8 * (digits + GUARD_DIGITS + n_collisions)
     return _decided(follow, digits + GUARD_DIGITS + n_collisions // 4, most)
@@ -158,7 +161,8 @@ def require_digits(found: ProvedCollision, digits: int) -> None:
     Raises:
         Undecidable: there are fewer.
     """
-    bound, after = Fraction(1, 10**digits), found.after
+    bound = Fraction(1, 10**digits)
+    after = found.after
     vectors = {"dt": (found.dt,), "velocity": (after.vx, after.vy), "place": (after.x, after.y)}
     for name, vector in vectors.items():
         size = max(abs(number.centre()) for number in vector)
@@ -170,7 +174,7 @@ def require_digits(found: ProvedCollision, digits: int) -> None:
 
 def _follow(
     arithmetic: Arithmetic,
-    scene: Scene,
+    table: PreparedTable,
     state: State,
     t_end: float | None,
     n_collisions: int,
@@ -187,7 +191,7 @@ def _follow(
     steps: list[ProvedCollision] = []
     outcome: Outcome | None
     try:
-        course = depart(arithmetic, scene, state, None if t_end is None else Fraction(float(t_end)))
+        course = depart(arithmetic, table, state, None if t_end is None else Fraction(float(t_end)))
         if isinstance(course, Undefined):
             # Nothing comes next, and nothing need come where no step is asked for, or no time is left.
             end = arrived(arithmetic, state) if t_end == state.t else course
@@ -198,7 +202,8 @@ def _follow(
     except Undecidable as question:
         if digits is not None:
             raise
-        outcome, jacobian = Undecided(f"{question} ({arithmetic.digits} digits)"), None
+        outcome = Undecided(f"{question} ({arithmetic.digits} digits)")
+        jacobian = None
     return Trajectory(steps, outcome, arithmetic.digits, jacobian)
 
 
@@ -210,7 +215,8 @@ def _extend(
     is_measured: bool,
 ) -> tuple[Outcome | None, Jacobian | None]:
     """Add steps until there are enough, or another outcome comes. Return it, else the Jacobian."""
-    arithmetic, matrix = course.arithmetic, identity(course.arithmetic)
+    arithmetic = course.arithmetic
+    matrix = identity(course.arithmetic)
     while len(steps) < n_collisions:
         hit = course.event()
         if not isinstance(hit, Hit):
@@ -245,7 +251,9 @@ def reflect(course: Course, hit: Hit) -> tuple[Interval, Interval]:
 
 def bounce(course: Course, hit: Hit) -> Bounce:
     """Reflect at a hit, and describe the next flight at an exact instant close to it."""
-    arithmetic, q, s = course.arithmetic, course.flight, hit.time
+    arithmetic = course.arithmetic
+    q = course.flight
+    s = hit.time
     vx, vy = reflect(course, hit)
     is_base = hit.wall == "base"
     x, y = q.x + q.vx * s, arithmetic.zero if is_base else q.y + q.vy * s
@@ -263,16 +271,18 @@ def bounce(course: Course, hit: Hit) -> Bounce:
 
 def fly_on(course: Course, hit: Hit, after: Bounce) -> Course:
     """Return the flight that follows a hit. The wall keeps its residual if it was left before."""
-    arithmetic, scene = course.arithmetic, course.scene
+    arithmetic = course.arithmetic
+    table = course.table
     leaving = {hit.wall: course.leaving.get(hit.wall, arithmetic.zero)}
-    in_cap = hit.wall == "arc" or (hit.wall == "base" and not isinstance(scene, Stem))
+    in_cap = hit.wall == "arc" or (hit.wall == "base" and not table.is_stem)
     end = None if course.end is None else course.end + course.flight.instant - after.flight.instant
-    return Course(scene, MovingWalls(arithmetic, scene, after.flight), leaving, False, in_cap, end, None)
+    return Course(table, MovingWalls(arithmetic, table, after.flight), leaving, False, in_cap, end, None)
 
 
 def collision(course: Course, hit: Hit, after: Bounce) -> ProvedCollision:
     """Return a collision free of its working precision."""
-    arithmetic, flight = course.arithmetic, course.flight
+    arithmetic = course.arithmetic
+    flight = course.flight
     close = arithmetic.enclosure
     return ProvedCollision(
         hit.wall,
@@ -293,7 +303,8 @@ def arrived(arithmetic: Arithmetic, state: State) -> ProvedHorizon:
 
 def horizon(course: Course) -> ProvedHorizon:
     """Return the state at a horizon that no collision comes before."""
-    arithmetic, flight = course.arithmetic, course.flight
+    arithmetic = course.arithmetic
+    flight = course.flight
     end = Fraction(FOR_EVER) if course.end is None else course.end
     s = arithmetic.dyadic(end)
     t = arithmetic.dyadic(flight.instant + end)

@@ -21,10 +21,9 @@ from math import lcm
 from typing import NamedTuple
 
 from reference.jets import Jet, multiply
+from reference.prepared import PreparedTable
 from reference.walls import wall_function
-from scene import Cap, Fourier, Law, Scene, State, Wall
-from scene.laws import Quadratic, is_constant, piece_at
-from scene.tables import laws, width_factors
+from scene import Law, State, Wall
 
 MAX_ORDER = 4096  # of the roots of unity whose sum may be found to be 0
 
@@ -121,20 +120,21 @@ def _is_zero_sum(factors: dict[Fraction, Fraction]) -> bool:
 
 def law_jet(law: Law, time: Fraction) -> Jet:
     """Return a law and its derivatives just after `time`."""
-    piece = piece_at(law, time)
-    if isinstance(piece, Quadratic):
-        u = time - piece.origin
-        return _rational_jet(piece.c0 + u * u * piece.c2, 2 * u * piece.c2, 2 * piece.c2)
-    if not isinstance(piece, Fourier):
-        return _rational_jet(Fraction(piece))
-    if piece.omega is None:
-        assert piece.period is not None
-        is_part, angle = True, time / Fraction(piece.period)
-        frequency = _collected([(Wave(power=1), 2 / Fraction(piece.period))])
+    piece = law.piece_at(time)
+    if piece.is_polynomial:
+        f, d1, half_d2, *_ = [*piece.polynomial(time), *[Fraction(0)] * 3]
+        return _rational_jet(f, d1, 2 * half_d2)
+    omega, length = piece.cycle
+    is_part = length is not None
+    if length is not None:
+        angle = time / length
+        frequency = _collected([(Wave(power=1), 2 / length)])
     else:
-        is_part, frequency, angle = False, exact(piece.omega), Fraction(piece.omega) * time
+        assert omega is not None
+        angle = Fraction(omega) * time
+        frequency = exact(omega)
     totals = [exact(piece.mean), exact(0), exact(0)]
-    for k, a, b in piece.harmonics():
+    for k, a, b in piece.harmonics:
         factor = exact(1)
         for order in range(3):
             # A derivative turns each cosine by a quarter; sin x is cos(x - quarter).
@@ -148,19 +148,20 @@ def _rational_jet(f: Fraction, d1: Fraction = Fraction(0), d2: Fraction = Fracti
     return Jet(exact(f), exact(d1), exact(d2))
 
 
-def wall_jet(scene: Scene, state: State, wall: Wall, s: Fraction) -> Jet:
+def wall_jet(table: PreparedTable, state: State, wall: Wall, s: Fraction) -> Jet:
     """Return f, f', f'' of a wall at flight time s, exactly."""
-    time, vx, vy = Fraction(state.t) + s, Fraction(state.vx), Fraction(state.vy)
+    time = Fraction(state.t) + s
+    vx = Fraction(state.vx)
+    vy = Fraction(state.vy)
     x = _rational_jet(Fraction(state.x) + vx * s, vx)
     y = _rational_jet(Fraction(state.y) + vy * s, vy)
 
     def law(name: str) -> Jet:
         if name != "w":
-            return law_jet(laws(scene)[name], time)
-        assert not isinstance(scene, Cap)
-        return reduce(multiply, (law_jet(factor, time) for factor in width_factors(scene)))
+            return law_jet(table.laws[name], time)
+        return reduce(multiply, (law_jet(table.laws[factor], time) for factor in table.width))
 
-    return wall_function(scene, wall, x, y, law, lambda p: multiply(p, p))
+    return wall_function(table, wall, x, y, law, lambda p: multiply(p, p))
 
 
 def crossing_time(state: State) -> Fraction | None:
@@ -170,24 +171,25 @@ def crossing_time(state: State) -> Fraction | None:
     return -Fraction(state.y) / Fraction(state.vy)
 
 
-def straight_time(scene: Scene, state: State, wall: Wall) -> Fraction | None:
+def straight_time(table: PreparedTable, state: State, wall: Wall) -> Fraction | None:
     """Return the exact flight time to a straight wall of the stem at rest, when it lies ahead.
 
     A wall that is being left and stands still is not met: None.
     """
-    if isinstance(scene, Cap) or wall == state.wall:
+    if table.is_cap or wall == state.wall:
         return None
-    moving = (scene.h,) if wall == "floor" else (*width_factors(scene), scene.slope)
-    if not all(map(is_constant, moving)):
+    moving = ("h",) if wall == "floor" else (*table.width, "slope")
+    if not all(table.laws[name].is_constant for name in moving):
         return None
-    jet = wall_jet(scene, state, wall, Fraction(0))
-    f, rate = jet.f.fraction(), jet.d1.fraction()
+    jet = wall_jet(table, state, wall, Fraction(0))
+    f = jet.f.fraction()
+    rate = jet.d1.fraction()
     return -f / rate if f is not None and rate is not None and f > 0 > rate else None
 
 
-def is_zero(scene: Scene, state: State, wall: Wall, s: Fraction) -> bool:
+def is_zero(table: PreparedTable, state: State, wall: Wall, s: Fraction) -> bool:
     """Tell whether f, less its residual f(0) on the wall being left, is known to vanish exactly at s."""
-    f: ExactNumber = wall_jet(scene, state, wall, s).f
+    f: ExactNumber = wall_jet(table, state, wall, s).f
     if wall == state.wall:
-        f += -wall_jet(scene, state, wall, Fraction(0)).f
+        f += -wall_jet(table, state, wall, Fraction(0)).f
     return f.is_zero()

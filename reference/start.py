@@ -6,20 +6,21 @@ from fractions import Fraction
 from reference import rational
 from reference.arithmetic import Arithmetic, Interval, Undecidable, exact_ends, sign
 from reference.course import SIDES, Course
+from reference.prepared import PreparedTable
 from reference.walls import EnclosedFlight, MovingWalls
-from scene import Cap, InvalidState, Mushroom, Scene, State, Stem, Undefined, Wall
+from scene import InvalidState, State, Undefined, Wall
 from scene.geometry import placed
-from scene.laws import is_constant
 from scene.states import ON_WALL
-from scene.tables import laws
 
 
-def depart(arithmetic: Arithmetic, scene: Scene, state: State, t_end: Fraction | None) -> Course | Undefined:
+def depart(
+    arithmetic: Arithmetic, table: PreparedTable, state: State, t_end: Fraction | None
+) -> Course | Undefined:
     """Judge the starting state; return the flight from it, or why mathematics gives no answer from there.
 
     Args:
         arithmetic: working precision.
-        scene: table and laws.
+        table: the scene, prepared.
         state: the exact start.
         t_end: horizon [time], exactly; None for none.
 
@@ -27,59 +28,62 @@ def depart(arithmetic: Arithmetic, scene: Scene, state: State, t_end: Fraction |
         InvalidState: the state is not in this table; naming field, value and bound.
         Undecidable: when this precision cannot tell.
     """
-    _check_part(scene, state)
-    motion = motion_at(scene, state, arithmetic)
+    _check_part(table, state)
+    motion = motion_at(table, state, arithmetic)
     if state.wall is not None:
-        _check_residual(scene, state, motion)
-    wall = _wall_left(scene, state, motion)
+        _check_residual(table, state, motion)
+    wall = _wall_left(table, state, motion)
     if isinstance(wall, Undefined):
         return wall
-    leaving, is_flat = {}, False
+    leaving = {}
+    is_flat = False
     if wall is not None:
-        judged = _judge_rise(scene, state, wall, motion)
+        judged = _judge_rise(table, state, wall, motion)
         if isinstance(judged, Undefined):
             return judged
-        leaving, is_flat = {wall: motion.wall(wall, arithmetic.zero).f}, judged
+        leaving = {wall: motion.wall(wall, arithmetic.zero).f}
+        is_flat = judged
     # New walls without cached values: the work of the flight then does not depend on the start.
-    motion, in_cap = motion_at(scene, state, arithmetic), _is_in_cap(scene, state, leaving)
+    motion = motion_at(table, state, arithmetic)
+    in_cap = _is_in_cap(table, state, leaving)
     end = None if t_end is None else t_end - motion.flight.instant
-    return Course(scene, motion, leaving, is_flat, in_cap, end, state)
+    return Course(table, motion, leaving, is_flat, in_cap, end, state)
 
 
-def motion_at(scene: Scene, state: State, arithmetic: Arithmetic) -> MovingWalls:
+def motion_at(table: PreparedTable, state: State, arithmetic: Arithmetic) -> MovingWalls:
     """Return the walls along the flight from a state."""
     numbers = (arithmetic.number(v) for v in (state.x, state.y, state.vx, state.vy))
     flight = EnclosedFlight._make((Fraction(state.t), *numbers, arithmetic.zero))
-    return MovingWalls(arithmetic, scene, flight)
+    return MovingWalls(arithmetic, table, flight)
 
 
-def _is_in_cap(scene: Scene, state: State, leaving: dict[Wall, Interval]) -> bool:
-    if not isinstance(scene, Mushroom):
-        return isinstance(scene, Cap)
+def _is_in_cap(table: PreparedTable, state: State, leaving: dict[Wall, Interval]) -> bool:
+    if not table.is_mushroom:
+        return table.is_cap
     if "arc" in leaving or "base" in leaving:
         return True
     is_rising_in_mouth = state.y == 0 and state.vy > 0 and not leaving
     return state.y > 0 or is_rising_in_mouth
 
 
-def _wall_left(scene: Scene, state: State, motion: MovingWalls) -> Wall | Undefined | None:
+def _wall_left(table: PreparedTable, state: State, motion: MovingWalls) -> Wall | Undefined | None:
     """Find the wall that a state leaves, None for none; a place on two walls is undefined."""
-    if _is_beside_mouth(scene, state, motion):
-        return _judge_on_base(scene, state, motion)
-    on = [wall for wall in _walls_near(scene, state) if _is_on(scene, state, wall, motion)]
+    if _is_beside_mouth(table, state, motion):
+        return _judge_on_base(table, state, motion)
+    on = [wall for wall in _walls_near(table, state) if _is_on(table, state, wall, motion)]
     if state.wall is not None:
         on.append(state.wall)
     # A place on two walls is undefined whichever way it moves; a side ends at the mouth's edge.
-    if isinstance(scene, Mushroom) and state.y == 0 and ("left" in on or "right" in on):
+    if table.is_mushroom and state.y == 0 and ("left" in on or "right" in on):
         return Undefined("mouth-edge")
     if len(on) > 1:
         return Undefined("corner")
     return on[0] if on else None
 
 
-def _check_part(scene: Scene, state: State) -> None:
+def _check_part(table: PreparedTable, state: State) -> None:
     """Refuse a mushroom's arc below y = 0 and its stem's walls above."""
-    if not isinstance(scene, Mushroom):
+    if not table.is_mushroom:
         return
     if state.wall == "arc" and state.y < 0:
         raise InvalidState(f"state.y = {state.y!r} on wall arc is beyond wall base, must be >= 0")
@@ -87,49 +91,49 @@ def _check_part(scene: Scene, state: State) -> None:
         raise InvalidState(f"state.y = {state.y!r} on wall {state.wall} is above the stem, must be <= 0")
 
 
-def _walls_near(scene: Scene, state: State) -> list[Wall]:
+def _walls_near(table: PreparedTable, state: State) -> list[Wall]:
     """List the walls that bound the state's part of the table; in a mushroom the arc ends at the base."""
-    if isinstance(scene, Cap):
+    if table.is_cap:
         return ["base", "arc"]
-    if isinstance(scene, Stem):
+    if table.is_stem:
         return ["base", *SIDES]
     if state.wall == "arc" and state.y == 0:
         return ["base", "arc"]
     return ["arc"] if state.y > 0 or state.wall in ("arc", "base") else list(SIDES)
 
 
-def _is_on(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> bool:
+def _is_on(table: PreparedTable, state: State, wall: Wall, motion: MovingWalls) -> bool:
     """Tell whether an unnamed wall passes exactly through the state; refuse a state beyond it."""
     if wall == state.wall:
         return False
     side = sign(motion.wall(wall, motion.arithmetic.zero).f)
     if side < 0:
-        raise InvalidState(placed(scene, state, wall, "beyond"))
-    if side == 0 and not rational.is_zero(scene, state, wall, Fraction(0)):
+        raise InvalidState(placed(table.given, state, wall, "beyond"))
+    if side == 0 and not rational.is_zero(table, state, wall, Fraction(0)):
         raise Undecidable(f"the state may be on wall {wall}")
     return side == 0
 
 
-def _judge_on_base(scene: Scene, state: State, motion: MovingWalls) -> Undefined | None:
+def _judge_on_base(table: PreparedTable, state: State, motion: MovingWalls) -> Undefined | None:
     """Judge a state on y = 0 that names no wall and is beyond the mouth's edge: it is on the base.
 
     The base ends at the arc. If the sign of the arc's f is open, the state may lie outside.
     """
-    if _is_on(scene, state, "arc", motion):
+    if _is_on(table, state, "arc", motion):
         return Undefined("corner")
     if state.vy < 0:
         raise InvalidState(f"state.vy = {state.vy!r}: the particle starts on wall base and moves into it")
     return Undefined("sliding") if state.vy == 0 else None
 
 
-def _is_beside_mouth(scene: Scene, state: State, motion: MovingWalls) -> bool:
+def _is_beside_mouth(table: PreparedTable, state: State, motion: MovingWalls) -> bool:
     """Tell whether a state that names no wall lies on y = 0 beyond the mouth's edge."""
-    if not isinstance(scene, Mushroom) or state.wall is not None or state.y != 0:
+    if not table.is_mushroom or state.wall is not None or state.y != 0:
         return False
     return any(sign(motion.wall(wall, motion.arithmetic.zero).f) < 0 for wall in ("left", "right"))
 
 
-def _judge_rise(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> Undefined | bool:
+def _judge_rise(table: PreparedTable, state: State, wall: Wall, motion: MovingWalls) -> Undefined | bool:
     """Judge f' at the start on a wall: True if f' = 0 and f'' > 0, False if f' > 0."""
     jet = motion.wall(wall, motion.arithmetic.zero)
     rise = sign(jet.d1)
@@ -137,7 +141,7 @@ def _judge_rise(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> 
         return False
     if rise < 0:
         raise InvalidState(f"state.wall = {wall!r}: the particle starts on this wall and moves into it")
-    exact = rational.wall_jet(scene, state, wall, Fraction(0))
+    exact = rational.wall_jet(table, state, wall, Fraction(0))
     if not exact.d1.is_zero():
         raise Undecidable("f' at the start has no sign")
     fraction = Fraction(0) if exact.d2.is_zero() else exact.d2.fraction()
@@ -146,15 +150,16 @@ def _judge_rise(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> 
         raise Undecidable("f'' at the start has no sign")
     if bend > 0:
         return True
-    is_at_rest = all(is_constant(law) for law in laws(scene).values())
+    is_at_rest = table.cycle is None
     return Undefined("sliding" if bend < 0 or is_at_rest or wall == "base" else "tangency")
 
 
-def _check_residual(scene: Scene, state: State, motion: MovingWalls) -> None:
+def _check_residual(table: PreparedTable, state: State, motion: MovingWalls) -> None:
     """Refuse a state too far from the wall it names, as measured by that wall's present size."""
-    wall, zero = state.wall, motion.arithmetic.zero
+    wall = state.wall
+    zero = motion.arithmetic.zero
     assert wall is not None
-    size = _distance_of(scene, wall, motion)
+    size = _distance_of(table, wall, motion)
     gap = motion.wall(wall, zero).f
     if wall == "arc":
         gap = gap / (2 * size)
@@ -172,11 +177,11 @@ def _check_residual(scene: Scene, state: State, motion: MovingWalls) -> None:
     raise InvalidState(f"state.wall = {wall!r}, but the state is {shown:.3g} away from that wall")
 
 
-def _distance_of(scene: Scene, wall: Wall, motion: MovingWalls) -> Interval:
+def _distance_of(table: PreparedTable, wall: Wall, motion: MovingWalls) -> Interval:
     """Return r for the arc, w for a side, h for the floor, the larger of r and w for the base, now."""
     zero = motion.arithmetic.zero
     if wall == "floor":
         return motion.law("h", zero).f
-    if wall in ("left", "right") or isinstance(scene, Stem):
+    if wall in ("left", "right") or table.is_stem:
         return motion.width(zero).f
     return motion.law("r", zero).f

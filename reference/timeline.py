@@ -24,14 +24,16 @@ from typing import Any
 
 from reference.arithmetic import Arithmetic, Interval, exact_ends, is_below, sign
 from reference.jets import Jet, united
-from scene import BangBang, Fourier, Law, Scene
-from scene.laws import Quadratic, breakpoints, is_constant, leg_at
+from reference.prepared import PreparedTable
+from scene import BangBang, Fourier, Law
 from scene.mpmath_internals import ends
-from scene.tables import laws, period
+from scene.pieces import PolynomialPiece
 
 ORDER = 8
 # In evaluations of a parabola, as measured: a wave; an expansion, and a wave of it.
-WORK_OF_A_WAVE, WORK_OF_AN_EXPANSION, WORK_OF_AN_EXPANDED_WAVE = 1.5, 4, 2
+WORK_OF_A_WAVE = 1.5
+WORK_OF_AN_EXPANSION = 4
+WORK_OF_AN_EXPANDED_WAVE = 2
 
 
 class Timeline:
@@ -39,14 +41,13 @@ class Timeline:
 
     Args:
         arithmetic: working precision.
-        scene: table and laws.
+        table: the scene, prepared.
         instant: the absolute time from which times are counted [time].
     """
 
-    def __init__(self, arithmetic: Arithmetic, scene: Scene, instant: Fraction) -> None:
-        self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in laws(scene).items()}
-        shared = period(scene)
-        length = None if shared is None else shared.value(arithmetic.context)
+    def __init__(self, arithmetic: Arithmetic, table: PreparedTable, instant: Fraction) -> None:
+        self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in table.laws.items()}
+        length = None if table.cycle is None else table.cycle.value(arithmetic.context)
         self.turn = None if length is None else arithmetic.upper(length)  # a period at least
         self._arithmetic = arithmetic
         # Particles at rest at several places ask for the same parts of a period.
@@ -73,14 +74,17 @@ class Timeline:
 
 def law_in_time(arithmetic: Arithmetic, law: Law, instant: Fraction) -> LawInTime:
     """Return a law as a function of the time since an instant."""
-    if isinstance(law, Fourier):
-        return Constant(arithmetic, law.mean) if is_constant(law) else Waves(arithmetic, law, instant)
-    if isinstance(law, BangBang):
-        return Constant(arithmetic, law.knots[0][1]) if is_constant(law) else Legs(arithmetic, law, instant)
-    return Constant(arithmetic, law)
+    if law.is_constant:
+        return Level(arithmetic, law.level)
+    match law:
+        case Fourier():
+            return Waves(arithmetic, law, instant)
+        case BangBang():
+            return Legs(arithmetic, law, instant)
+    raise TypeError(f"{type(law).__name__}: the reference does not enclose this kind of law")
 
 
-class Constant:
+class Level:
     """A law that never changes."""
 
     def __init__(self, arithmetic: Arithmetic, value: float) -> None:
@@ -103,8 +107,10 @@ class Legs:
     """A bang-bang law: parabolas that join smoothly."""
 
     def __init__(self, arithmetic: Arithmetic, law: BangBang, instant: Fraction) -> None:
-        self.arithmetic, self.law, self.instant = arithmetic, law, instant
-        self.period = Fraction(law.knots[-1][0]) - Fraction(law.knots[0][0])
+        self.arithmetic = arithmetic
+        self.law = law
+        self.instant = instant
+        self.period = law.length
 
     def jet(self, s: Interval) -> Jet:
         """Unite the parabolas that times within s may lie on."""
@@ -113,7 +119,7 @@ class Legs:
             return self._whole()
         parts = []
         while True:
-            piece = leg_at(self.law, low)
+            piece = self.law.leg_at(low)
             stop = min(piece.end, high)
             part = self.arithmetic.between(low - self.instant, stop - self.instant)
             parts.append(self._on(piece, part))
@@ -121,22 +127,25 @@ class Legs:
                 return united(self.arithmetic, parts)
             low = stop
 
-    def _on(self, piece: Quadratic, s: Interval) -> Jet:
+    def _on(self, piece: PolynomialPiece, s: Interval) -> Jet:
         """Evaluate one parabola at times since the instant."""
         self.arithmetic.spend(1)
         number = self.arithmetic.number
-        u, bend = number(self.instant - piece.origin) + s, number(2 * piece.c2)
-        return Jet(number(piece.c0) + bend * self.arithmetic.square(u) / 2, bend * u, bend)
+        at_rest, _, half_bend = piece.coefficients
+        u = number(self.instant - piece.origin) + s
+        bend = number(2 * half_bend)
+        return Jet(number(at_rest) + bend * self.arithmetic.square(u) / 2, bend * u, bend)
 
     def _whole(self) -> Jet:
         """Enclose the law over all of its period."""
         arithmetic = self.arithmetic
         arithmetic.spend(1)
-        legs = [(leg_at(self.law, start), end - start) for start, end in pairwise(breakpoints(self.law))]
-        speed = max(abs(2 * piece.c2) * length for piece, length in legs)
-        bend = max(abs(2 * piece.c2) for piece, _ in legs)
+        lengths = [end - start for start, end in pairwise(self.law.breakpoints())]
+        bends = [abs(2 * leg.coefficients[2]) for leg in self.law.half_legs]
+        speed = max(bend * length for bend, length in zip(bends, lengths, strict=True))
+        bend = max(bends)
         both = arithmetic.context.mpf([-1, 1])
-        whole = arithmetic.union([arithmetic.number(piece.c0) for piece, _ in legs])
+        whole = arithmetic.union([arithmetic.number(leg.coefficients[0]) for leg in self.law.half_legs])
         return Jet(whole, arithmetic.number(speed) * both, arithmetic.number(bend) * both)
 
     def knots(self, low: Fraction, high: Fraction) -> list[Fraction]:
@@ -144,10 +153,10 @@ class Legs:
         found: list[Fraction] = []
         if high - low >= self.period:
             return found
-        end = leg_at(self.law, self.instant + low).end
+        end = self.law.leg_at(self.instant + low).end
         while end < self.instant + high:
             found.append(end - self.instant)
-            end = leg_at(self.law, end).end
+            end = self.law.leg_at(end).end
         return found
 
     def is_whole(self, length: Fraction) -> bool:
@@ -191,7 +200,9 @@ class Waves:
     def _summed(self, s: Interval) -> Jet:
         """Sum the harmonics and their derivatives."""
         self.arithmetic.spend(WORK_OF_A_WAVE * len(self.terms))
-        f, d1, d2 = self.mean, self.arithmetic.zero, self.arithmetic.zero
+        f = self.mean
+        d1 = self.arithmetic.zero
+        d2 = self.arithmetic.zero
         for frequency, wave, quadrature in self._waves(s):
             f = f + wave
             d1 = d1 + frequency * quadrature
@@ -218,7 +229,9 @@ class Waves:
 
     def _waves(self, s: Interval) -> list[tuple[Interval, Interval, Interval]]:
         """Return frequency, value, and rate / frequency of each wave k."""
-        found, phase, zero = [], self.phase + self.omega * s, self.arithmetic.zero
+        found = []
+        phase = self.phase + self.omega * s
+        zero = self.arithmetic.zero
         for k, frequency, a, b in self.terms:
             cos, sin = self.arithmetic.cos_sin(k * phase)
             wave, quadrature = zero, zero
@@ -246,4 +259,4 @@ class Waves:
         return exact_ends(self.omega)[0] * length >= 7
 
 
-LawInTime = Constant | Legs | Waves  # a law as a function of the time since an instant
+LawInTime = Level | Legs | Waves  # a law as a function of the time since an instant

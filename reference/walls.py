@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from fractions import Fraction
-from functools import partial
+from functools import partial, reduce
 from typing import Any, NamedTuple
 
 from reference.arithmetic import Arithmetic, Interval
 from reference.jets import Jet, add, multiply, negative, square
+from reference.prepared import PreparedTable
 from reference.timeline import Timeline
-from scene import Scene, Stem, Wall
+from scene import Wall
 from scene.mpmath_internals import ends
 
 
@@ -39,7 +40,7 @@ class EnclosedFlight(NamedTuple):
 
 
 def wall_function(
-    scene: Scene,
+    table: PreparedTable,
     wall: Wall,
     x: Jet,
     y: Jet,
@@ -49,7 +50,7 @@ def wall_function(
     """Return f, f', f'' of a wall for a particle at (x, y).
 
     Args:
-        scene: the table.
+        table: the scene, prepared.
         wall: one of its walls.
         x: of the particle, as a function of time.
         y: likewise.
@@ -57,7 +58,7 @@ def wall_function(
         square_of: returns a square.
     """
     if wall == "base":
-        return negative(y) if isinstance(scene, Stem) else y
+        return negative(y) if table.is_stem else y
     if wall == "floor":
         return add(y, law("h"))
     if wall == "arc":
@@ -69,17 +70,19 @@ def wall_function(
 class MovingWalls:
     """Evaluates the walls along a flight."""
 
-    def __init__(self, arithmetic: Arithmetic, scene: Scene, flight: EnclosedFlight) -> None:
+    def __init__(self, arithmetic: Arithmetic, table: PreparedTable, flight: EnclosedFlight) -> None:
         self.arithmetic = arithmetic
         self.flight = flight
-        self.scene = scene
-        self.timeline = Timeline(arithmetic, scene, flight.instant)
+        self.table = table
+        self.timeline = Timeline(arithmetic, table, flight.instant)
         # Neighbouring intervals share ends, and later proofs reuse results of earlier ones.
         self._known: dict[tuple[Wall, Any], Jet] = {}
 
     def at_rest(self, s: Interval) -> MovingWalls:
         """Return the walls for a particle at rest where the flight is at s. Evaluated laws are shared."""
-        q, zero, still = self.flight, self.arithmetic.zero, copy(self)
+        q = self.flight
+        zero = self.arithmetic.zero
+        still = copy(self)
         still.flight = q._replace(x=q.x + q.vx * s, y=q.y + q.vy * s, vx=zero, vy=zero)
         still._known = {}
         return still
@@ -90,9 +93,7 @@ class MovingWalls:
 
     def width(self, s: Interval) -> Jet:
         """Enclose the half-width w of the mouth, w = nu r where nu is given."""
-        if "nu" in self.timeline.laws:
-            return multiply(self.law("nu", s), self.law("r", s))
-        return self.law("w", s)
+        return reduce(multiply, (self.law(name, s) for name in self.table.width))
 
     def wall(self, wall: Wall, s: Interval) -> Jet:
         """Enclose f, f', f'' of a wall over flight times s."""
@@ -104,28 +105,32 @@ class MovingWalls:
         return self._known[key]
 
     def _evaluated(self, wall: Wall, s: Interval) -> Jet:
-        q, zero = self.flight, self.arithmetic.zero
+        q = self.flight
+        zero = self.arithmetic.zero
         x, y = Jet(q.x + q.vx * s, q.vx, zero), Jet(q.y + q.vy * s, q.vy, zero)
 
         def law(name: str) -> Jet:
             return self.width(s) if name == "w" else self.law(name, s)
 
-        return wall_function(self.scene, wall, x, y, law, partial(square, self.arithmetic))
+        return wall_function(self.table, wall, x, y, law, partial(square, self.arithmetic))
 
     def gradient(self, wall: Wall, s: Interval) -> tuple[Interval, Interval, Interval]:
         """Enclose the partial derivatives of f by x, y and t at flight time s."""
-        q, f_t = self.flight, self.at_rest(s).wall(wall, s).d1
-        one, zero = self.arithmetic.number(1), self.arithmetic.zero
+        q = self.flight
+        f_t = self.at_rest(s).wall(wall, s).d1
+        one = self.arithmetic.number(1)
+        zero = self.arithmetic.zero
         if wall == "arc":
             return -2 * (q.x + q.vx * s), -2 * (q.y + q.vy * s), f_t
         if wall in ("left", "right"):
             return (-one if wall == "right" else one), self.law("slope", s).f, f_t
-        is_down = wall == "base" and isinstance(self.scene, Stem)
+        is_down = wall == "base" and self.table.is_stem
         return zero, -one if is_down else one, f_t
 
     def hessian(self, wall: Wall, s: Interval) -> tuple[Interval, Interval, Interval, Interval]:
         """Enclose f_xx, f_yy, f_yt and f_tt at flight time s; the other second partials are 0."""
-        f_tt, zero = self.at_rest(s).wall(wall, s).d2, self.arithmetic.zero
+        f_tt = self.at_rest(s).wall(wall, s).d2
+        zero = self.arithmetic.zero
         f_yt = self.law("slope", s).d1 if wall in ("left", "right") else zero
         curved = self.arithmetic.number(-2) if wall == "arc" else zero
         return curved, curved, f_yt, f_tt

@@ -4,7 +4,7 @@
 `geometry` describes a table at one instant. `transforms` are changes that leave the physics the same.
 """
 
-from scene.laws import BangBang, Fourier, Law
+from scene.laws import BangBang, Constant, Fourier, GivenLaw, Law
 from scene.load import catalogue, from_data, load, to_data
 from scene.notebook import of_scene
 from scene.refusal import BadInput, InvalidScene, check_count, check_number
@@ -16,7 +16,9 @@ __all__ = [
     "BangBang",
     "Cap",
     "Collision",
+    "Constant",
     "Fourier",
+    "GivenLaw",
     "Horizon",
     "InvalidScene",
     "InvalidState",

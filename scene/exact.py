@@ -11,30 +11,28 @@ from functools import cache
 from itertools import pairwise
 from math import comb, gcd, lcm
 
-from scene.laws import BangBang, Fourier, Law, Quadratic, breakpoints, piece_at
+from scene.laws import Law, law_of
 
 POWERS_OF_I = ((1, 0, -1, 0), (0, 1, 0, -1))  # real and imaginary parts of i^0 ... i^3
 
 
-def leg_intervals(legs: Sequence[BangBang]) -> list[tuple[Fraction, Fraction]]:
-    """Cut one period, shared by these laws, at every time at which one of them is not analytic."""
-    start, span = Fraction(legs[0].knots[0][0]), Fraction(0)
+def leg_intervals(legs: Sequence[Law]) -> list[tuple[Fraction, Fraction]]:
+    """Cut one period, shared by these laws with knots, at every time at which one is not analytic."""
+    start = legs[0].breakpoints()[0]
+    span = Fraction(0)
     cuts = {start}
     for law in legs:
-        times = breakpoints(law)
+        times = law.breakpoints()
         span = times[-1] - times[0]
         cuts |= {start + (t - start) % span for t in times}
     return list(pairwise([*sorted(cuts), start + span]))
 
 
-def leg_polynomial(law: Law, start: Fraction) -> Polynomial:
-    """Return a constant or a bang-bang law in the variable t - start, right until its next half leg."""
-    piece = piece_at(law, start)
-    if isinstance(piece, Quadratic):
-        d = start - piece.origin
-        return trimmed([piece.c0 + piece.c2 * d**2, 2 * piece.c2 * d, piece.c2])
-    assert isinstance(piece, float)
-    return trimmed([Fraction(piece)])
+def leg_polynomial(law: float | Law, start: Fraction) -> Polynomial:
+    """Return a law made of polynomials in the variable t - start, right until its next breakpoint."""
+    piece = law_of(law).piece_at(start)
+    assert piece.is_polynomial
+    return piece.polynomial(start)
 
 
 def one_plus_square(n: int) -> Polynomial:
@@ -42,17 +40,16 @@ def one_plus_square(n: int) -> Polynomial:
     return [Fraction(comb(n, k // 2)) if k % 2 == 0 else Fraction(0) for k in range(2 * n + 1)]
 
 
-def half_angle(law: Law, order: int = 0) -> tuple[Polynomial, int]:
+def half_angle(law: float | Law, order: int = 0) -> tuple[Polynomial, int]:
     """Return (N, n) with law = N(x) / (1 + x^2)^n, x = tan(omega t / 2), n its highest harmonic.
 
-    For order 1 it is the law's derivative by omega t. A bang-bang law must be constant.
+    For order 1 it is the law's derivative by omega t. The law must be a sum of waves, or constant.
     """
-    if not isinstance(law, Fourier):
-        level = law.knots[0][1] if isinstance(law, BangBang) else law
-        return trimmed([Fraction(level)] if order == 0 else []), 0
+    law = law_of(law)
+    assert law.is_trigonometric
     harmonics = law.harmonics()
     n = max((k for k, _, _ in harmonics), default=0)
-    total = scale(one_plus_square(n), Fraction(law.mean)) if order == 0 else []
+    total = scale(one_plus_square(n), Fraction(law.level)) if order == 0 else []
     for k, c, s in harmonics:
         cosine, sine = Fraction(c), Fraction(s)
         if order == 1:
@@ -106,7 +103,8 @@ def derivative(p: Polynomial) -> Polynomial:
 def at(p: Polynomial, x: Fraction) -> Fraction:
     """Evaluate p at x, exactly: in whole numbers, as fractions would be reduced at every step."""
     common = lcm(*(a.denominator for a in p))
-    total, power = 0, 1
+    total = 0
+    power = 1
     for a in reversed(p):
         total = total * x.numerator + a.numerator * (common // a.denominator) * power
         power *= x.denominator
@@ -128,10 +126,12 @@ def divide(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
     """
     rest, divisor = ([a.numerator for a in _primitive(polynomial)] for polynomial in (p, q))
     quotient = [0] * max(len(rest) - len(divisor) + 1, 0)
-    size, sign = abs(divisor[-1]), 1 if divisor[-1] > 0 else -1
+    size = abs(divisor[-1])
+    sign = 1 if divisor[-1] > 0 else -1
     for shift in reversed(range(len(quotient))):
         factor = sign * rest[shift + len(divisor) - 1]
-        rest, quotient = [size * a for a in rest], [size * a for a in quotient]
+        rest = [size * a for a in rest]
+        quotient = [size * a for a in quotient]
         quotient[shift] = factor
         for i, b in enumerate(divisor):
             rest[shift + i] -= factor * b

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpmath import fp
 
-from scene.laws import value
+from scene.laws import Constant
 from scene.precision import decimals, reduce_record
 from scene.states import ON_WALL, State
-from scene.tables import Cap, Scene, Stem, Wall, laws, width_factors
+from scene.tables import Cap, Scene, Stem, Wall
 
 DIGITS = 50  # to which `rounded` evaluates laws before it rounds them
 
@@ -77,7 +77,8 @@ class TableAt(NamedTuple):
 
         The distance is |f| / |grad f|. Beyond the ends of a wall it is larger.
         """
-        above, below = max(0.0, y), max(0.0, -y)
+        above = max(0.0, y)
+        below = max(0.0, -y)
         distances: dict[Wall, float] = {}
         if not isinstance(self.scene, Stem):
             distances["arc"] = abs(self.r - math.hypot(x, y)) + below
@@ -152,7 +153,9 @@ class TableAt(NamedTuple):
             (x, depth), each of shape (n,) [length]; the points are (x, -depth). All 0 in a cap.
         """
         # At depth d the stem is 2 (w - slope d) wide: solve 2 w d - slope d^2 = a area for d.
-        w, slope, area = self.w, self.slope, self.stem_area()
+        w = self.w
+        slope = self.slope
+        area = self.stem_area()
         depth = a * area / (w + np.sqrt(np.maximum(w * w - slope * a * area, 0.0)) + 1e-300)
         return (w - slope * depth) * (2.0 * b - 1.0), depth
 
@@ -175,9 +178,7 @@ def half_width(ctx: Any, scene: Scene, t: Any) -> Any:
 
     With `fp` t may be an array of times.
     """
-    if isinstance(scene, Cap):
-        return ctx.mpf(0)
-    return math.prod(value(ctx, law, t) for law in width_factors(scene))
+    return scene.width.value(ctx, t)
 
 
 def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
@@ -185,13 +186,9 @@ def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
 
     With `fp` t may be an array of times: what moves is then an array, too.
     """
-    given = laws(scene)
-    now, rate = ({name: value(ctx, law, t, order) for name, law in given.items()} for order in (0, 1))
-    if "nu" in given:
-        now["w"] = now["nu"] * now["r"]
-        rate["w"] = rate["nu"] * now["r"] + now["nu"] * rate["r"]
-    numbers = (column.get(name, ctx.mpf(0)) for column in (now, rate) for name in ("r", "w", "h", "slope"))
-    return TableAt(scene, *numbers)
+    known = {**scene.laws, "w": scene.width}
+    laws = [known.get(name, Constant(0.0)) for name in ("r", "w", "h", "slope")]
+    return TableAt(scene, *(law.value(ctx, t, order) for order in (0, 1) for law in laws))
 
 
 def rounded(scene: Scene, t: float) -> TableAt:
@@ -210,7 +207,9 @@ def placed(scene: Scene, state: State, wall: Wall, how: str) -> str:
         how: "beyond" or "within rounding of".
     """
     ctx = decimals(DIGITS)
-    table, x, y = table_at(ctx, scene, state.t), ctx.mpf(state.x), ctx.mpf(state.y)
+    table = table_at(ctx, scene, state.t)
+    x = ctx.mpf(state.x)
+    y = ctx.mpf(state.y)
     away = abs(table.gap(wall, x, y)) / (table.r + ctx.hypot(x, y) if wall == "arc" else 1)
     is_after_a_hit = state.wall is None and away <= ON_WALL * table.size
     hint = f": name the wall that is left (state.wall = {wall!r})" if is_after_a_hit else ""

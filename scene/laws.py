@@ -1,36 +1,184 @@
 """Laws of motion: table parameters as functions of time.
 
-A law is a bare number, a trigonometric polynomial or a bang-bang motion. Its numbers are
-binary64 and mean exactly that real number. On each of its analytic pieces a law is a
-constant, a trigonometric polynomial or a quadratic with rational coefficients. `piece_at`
-returns that piece. `evaluate` works in each of mpmath's number systems (`mp`, `fp`, `iv`),
-so one definition serves points, floats and enclosures.
+A law is `Constant`, `Fourier` or `BangBang`. Its numbers are binary64 and mean exactly that real
+number. All kinds have one interface, that of `Law`: only what compiles or encloses a law must know
+its kind. A table's fields take a bare number for a constant; `scene.laws` of a table are objects.
+
+On each of its analytic pieces (`scene.pieces`) a law is a constant, a polynomial with rational
+coefficients, or a sum of waves. docs/new-law.md says how to add a kind.
 """
+
+from __future__ import annotations
 
 import itertools
 import math
 from bisect import bisect_right
 from collections.abc import Iterable
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 from msgspec.structs import force_setattr
-from numpy.typing import NDArray
 
+from scene import bounds as bound
+from scene.bounds import Bounds
+from scene.pieces import (
+    Arrays,
+    ConstantPiece,
+    FloatArray,
+    Period,
+    Piece,
+    PolynomialPiece,
+    TrigonometricPiece,
+)
 from scene.refusal import BadInput, InvalidScene, check_list, check_number, listed, shown
 
 MAX_HARMONICS = 16  # validity is decided by exact algebra, whose cost grows steeply with the degree
 MAX_KNOTS = 256
-LEAST_NORMAL = 2.0**-1022
 
-FloatArray = NDArray[np.float64]
+
+class Law(msgspec.Struct, frozen=True, dict=True):
+    """A parameter of a table as a function of time: what all kinds of laws answer.
+
+    A kind must define `cycle`, `level`, `piece_at`, `bounds`, `scaled` and `reversed`. What else is
+    here holds for a law that has a single analytic piece, for ever. A law with knots defines
+    `origin`, `breakpoints`, `value` and `values` as well.
+    """
+
+    @property
+    def cycle(self) -> Period | None:
+        """Return the period of a law that moves; None when it never changes."""
+        raise NotImplementedError
+
+    @property
+    def level(self) -> float:
+        """Return the value of a constant law, else one of the law's own numbers that tells its size.
+
+        For a positive law it is within a factor of a few dozen of the largest value.
+        """
+        raise NotImplementedError
+
+    def piece_at(self, time: Fraction) -> Piece:
+        """Return the analytic piece that holds at an exact time and just after it."""
+        raise NotImplementedError
+
+    def bounds(self) -> Bounds:
+        """Bound the law and its derivatives for all times, rounded outward at every scale."""
+        raise NotImplementedError
+
+    def scaled(self, size: int, time: int) -> Law:
+        """Return the law with its values times 2^size and its times times 2^time."""
+        raise NotImplementedError
+
+    def reversed(self) -> Law:
+        """Return the law that runs backwards: f(-t) for f(t)."""
+        raise NotImplementedError
+
+    @property
+    def is_constant(self) -> bool:
+        """Tell whether the law never changes."""
+        return self.cycle is None
+
+    @property
+    def is_polynomial(self) -> bool:
+        """Tell whether each piece is a polynomial of time; a constant law is one."""
+        return self.is_constant
+
+    @property
+    def is_trigonometric(self) -> bool:
+        """Tell whether the law is `level` and the sum of its `harmonics`; a constant law is that."""
+        return self.is_constant
+
+    @property
+    def origin(self) -> float | None:
+        """Return a time at which a cycle begins best [time]; None for a law without knots."""
+        return None
+
+    def breakpoints(self) -> list[Fraction]:
+        """Return the times in one period, ends included, at which the law is not analytic."""
+        return []
+
+    def harmonics(self) -> list[tuple[int, float, float]]:
+        """Return (k, cosine amplitude, sine amplitude) for every wave of the law."""
+        return []
+
+    @property
+    def factors(self) -> tuple[Law, ...]:
+        """Return the laws whose product it is: itself alone (see `Product`)."""
+        return (self,)
+
+    def value(self, ctx: Any, t: Any, order: int = 0) -> Any:
+        """Evaluate the law, or a derivative, at a point (not an interval) of time.
+
+        Args:
+            ctx: an mpmath context: mp, fp or a private one.
+            t: time, a number of ctx [time]; or an array of times, as in `values`.
+            order: 0, 1 or 2.
+        """
+        if isinstance(t, np.ndarray):
+            return self.values(t, order)
+        return self.piece_at(Fraction(0)).evaluate(ctx, t, order)
+
+    def values(self, times: FloatArray, order: int = 0) -> FloatArray:
+        """Evaluate the law, or its derivative of order 1 or 2, in binary64 at times of any shape.
+
+        Times since the first knot, phases and omega t are rounded as floats are.
+        """
+        found = self.piece_at(Fraction(0)).evaluate(Arrays, times, order)
+        return np.full(times.shape, found)
+
+    def size_bounds(self) -> Bounds:
+        """Bound a law that is a size (radius, width, depth or nu), positive as its scene is valid."""
+        return self.bounds()
+
+    def as_field(self) -> float | Law:
+        """Return the law as a table's field gives it: a constant is a bare number there."""
+        return self
+
+    def __call__(self, t: Any) -> Any:
+        """Return the value at a time, or an array of values at an array of times of any shape.
+
+        Raises:
+            BadInput: a time is not a finite number.
+        """
+        return _called(self, t)
+
+
+class Constant(Law, frozen=True):
+    """A law that never changes. Tables check its number, and keep it as a bare one."""
+
+    level: float
+
+    @property
+    def cycle(self) -> None:
+        """Return None."""
+        return
+
+    def piece_at(self, time: Fraction) -> ConstantPiece:
+        """Return the constant."""
+        return ConstantPiece(self.level)
+
+    def bounds(self) -> Bounds:
+        """Return the level twice, and no motion."""
+        return Bounds(self.level, self.level, 0.0, 0.0)
+
+    def scaled(self, size: int, time: int) -> Constant:
+        """Return the level times 2^size."""
+        return Constant(times_power(self.level, size))
+
+    def reversed(self) -> Constant:
+        """Return the law itself."""
+        return self
+
+    def as_field(self) -> float:
+        """Return the bare number."""
+        return self.level
 
 
 class Fourier(
-    msgspec.Struct,
+    Law,
     frozen=True,
     tag_field="kind",
     tag="fourier",
@@ -65,17 +213,80 @@ class Fourier(
             raise InvalidScene(f"fourier.{field} = {size}, must be finite and > 0")
         force_setattr(self, field, size)
 
-    def __call__(self, t: Any) -> Any:
-        """Return the value at a time, or an array of values at an array of times."""
-        return at(self, t)
+    @cached_property
+    def _piece(self) -> ConstantPiece | TrigonometricPiece:
+        pairs = itertools.zip_longest(self.cos, self.sin, fillvalue=0.0)
+        harmonics = tuple((k, c, s) for k, (c, s) in enumerate(pairs, 1) if c or s)
+        if not harmonics:
+            return ConstantPiece(self.mean)
+        length = None if self.period is None else Fraction(self.period)
+        return TrigonometricPiece(self.mean, harmonics, Period(self.omega, length))
+
+    @property
+    def cycle(self) -> Period | None:
+        """Return the period of the first harmonic; None without harmonics."""
+        return None if self._piece.is_polynomial else self._piece.cycle
+
+    @property
+    def level(self) -> float:
+        """Return the mean."""
+        return self.mean
+
+    @property
+    def is_trigonometric(self) -> bool:
+        """Return True."""
+        return True
 
     def harmonics(self) -> list[tuple[int, float, float]]:
         """Return (k, cosine amplitude, sine amplitude) for every harmonic present."""
-        pairs = itertools.zip_longest(self.cos, self.sin, fillvalue=0.0)
-        return [(k, c, s) for k, (c, s) in enumerate(pairs, 1) if c or s]
+        return [] if self._piece.is_polynomial else list(self._piece.harmonics)
+
+    def frequency(self, ctx: Any) -> Any:
+        """Return omega [1/time] in a number system; in `iv` an enclosure where it is irrational."""
+        if self.period is not None:
+            return 2 * ctx.pi / ctx.mpf(self.period)
+        return ctx.mpf(self.omega)
+
+    def piece_at(self, time: Fraction) -> ConstantPiece | TrigonometricPiece:
+        """Return the one piece."""
+        return self._piece
+
+    def bounds(self) -> Bounds:
+        """Bound the law by its mean and all its amplitudes."""
+        harmonics = self.harmonics()
+        if not harmonics:
+            return Bounds(self.mean, self.mean, 0.0, 0.0)
+        if self.period is None:
+            assert self.omega is not None
+            return bound.of_waves(self.mean, harmonics, *math.frexp(self.omega))
+        fraction, exponent = math.frexp(self.period)
+        return bound.of_waves(self.mean, harmonics, 2 * math.pi / fraction, -exponent)
+
+    def size_bounds(self) -> Bounds:
+        """Bound a law that is a size, positive as its scene is valid.
+
+        `bounds` subtracts all amplitudes from the mean. The result may be negative although the law is not:
+        1 + 0.9 cos x - 0.35 cos 3x is above 0.1. Here the least value is never below 0; a lower bound of 0
+        only says that the law is positive.
+        """
+        found = self.bounds()
+        if found.lowest > 0.0:
+            return found
+        return found._replace(lowest=bound.least_of_waves(self.mean, self.harmonics()))
+
+    def scaled(self, size: int, time: int) -> Fourier:
+        """Return the law with its values times 2^size and its times times 2^time."""
+        cos, sin = (tuple(times_power(a, size) for a in given) for given in (self.cos, self.sin))
+        omega = None if self.omega is None else times_power(self.omega, -time)
+        period = None if self.period is None else times_power(self.period, time)
+        return Fourier(mean=times_power(self.mean, size), omega=omega, cos=cos, sin=sin, period=period)
+
+    def reversed(self) -> Fourier:
+        """Return the law that runs backwards."""
+        return msgspec.structs.replace(self, sin=tuple(-b for b in self.sin))
 
 
-class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", forbid_unknown_fields=True):
+class BangBang(Law, frozen=True, tag_field="kind", tag="bang-bang", forbid_unknown_fields=True):
     """At rest at each knot (time, value); constant acceleration to mid-leg, the opposite after."""
 
     knots: tuple[tuple[float, float], ...]
@@ -92,12 +303,174 @@ class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", f
         force_setattr(self, "knots", tuple(checked_knot(i, knot) for i, knot in enumerate(knots)))
         check_legs(self.knots)
 
+    @cached_property
+    def half_legs(self) -> tuple[PolynomialPiece, ...]:
+        """Return the parabolas of the period that begins at the first knot, also of a law at rest."""
+        found = []
+        for knot, next_knot in itertools.pairwise(self.knots):
+            start, before = map(Fraction, knot)
+            stop, after = map(Fraction, next_knot)
+            half_acceleration = 2 * (after - before) / (stop - start) ** 2
+            zero = Fraction(0)
+            found.append(PolynomialPiece(start, (before, zero, half_acceleration), (start + stop) / 2))
+            found.append(PolynomialPiece(stop, (after, zero, -half_acceleration), stop))
+        return tuple(found)
+
+    @cached_property
+    def length(self) -> Fraction:
+        """Return the time from the first knot to the last [time], also of a law at rest."""
+        return Fraction(self.knots[-1][0]) - Fraction(self.knots[0][0])
+
+    @cached_property
+    def is_constant(self) -> bool:
+        """Tell whether all knots have the same value."""
+        return all(value == self.knots[0][1] for _, value in self.knots)
+
+    @property
+    def cycle(self) -> Period | None:
+        """Return the time from the first knot to the last; None when all have the same value."""
+        return None if self.is_constant else Period(None, self.length)
+
+    @property
+    def level(self) -> float:
+        """Return the highest value."""
+        return max(value for _, value in self.knots)
+
+    @property
+    def is_polynomial(self) -> bool:
+        """Return True: each half leg is a parabola."""
+        return True
+
+    @property
+    def origin(self) -> float:
+        """Return the first knot's time."""
+        return self.knots[0][0]
+
+    def breakpoints(self) -> list[Fraction]:
+        """Return all knots and the middles of the legs."""
+        return [self.half_legs[0].origin, *(leg.end for leg in self.half_legs)]
+
+    def leg_at(self, time: Fraction) -> PolynomialPiece:
+        """Return the half leg that holds at `time` and just after it, also of a law at rest."""
+        legs = self.half_legs
+        shift = (time - legs[0].origin) // self.length * self.length
+        return legs[bisect_right(legs, time - shift, key=lambda leg: leg.end)].later(shift)
+
+    def piece_at(self, time: Fraction) -> ConstantPiece | PolynomialPiece:
+        """Return the half leg, or the constant."""
+        return ConstantPiece(self.knots[0][1]) if self.is_constant else self.leg_at(time)
+
+    def value(self, ctx: Any, t: Any, order: int = 0) -> Any:
+        """Evaluate the law, or a derivative, at a point of time: on the piece that holds there exactly."""
+        if isinstance(t, np.ndarray):
+            return self.values(t, order)
+        time = Fraction(*map(int, t.as_integer_ratio()))  # of mpf the parts are integers of gmpy2
+        return self.piece_at(time).evaluate(ctx, t, order)
+
+    def values(self, times: FloatArray, order: int = 0) -> FloatArray:
+        """Evaluate the law, or its derivative of order 1 or 2, in binary64 at times of any shape."""
+        if self.is_constant:
+            return super().values(times, order)
+        knots = np.array([t for t, _ in self.knots])
+        phases = knots[0] + np.mod(times - knots[0], knots[-1] - knots[0])
+        legs = np.minimum(np.searchsorted(knots, phases, side="right"), len(knots) - 1) - 1
+        # The middle of a leg need not be a float.
+        is_late = phases - knots[legs] >= knots[legs + 1] - phases
+        found = np.empty(times.shape)
+        for leg in np.unique(legs):
+            halves = self.half_legs[2 * leg : 2 * leg + 2]
+            for piece, half in zip(halves, (~is_late, is_late), strict=True):
+                chosen = (legs == leg) & half
+                found[chosen] = piece.evaluate(Arrays, phases[chosen], order)
+        return found
+
+    def bounds(self) -> Bounds:
+        """Bound the law by its lowest and highest knots and its steepest and shortest legs."""
+        return bound.of_legs(self.knots)
+
+    def scaled(self, size: int, time: int) -> BangBang:
+        """Return the law with its values times 2^size and its times times 2^time."""
+        return BangBang(knots=tuple((times_power(t, time), times_power(v, size)) for t, v in self.knots))
+
+    def reversed(self) -> BangBang:
+        """Return the law that runs backwards."""
+        return BangBang(knots=tuple((-t, v) for t, v in reversed(self.knots)))
+
+
+WRITTEN = (Fourier, BangBang)  # the kinds that files and messages name; a constant is a bare number
+GivenLaw = float | Fourier | BangBang  # what a table's field takes
+
+
+class Product(NamedTuple):
+    """The product of two positive laws, as the half-width w = nu r: what a table asks of a law."""
+
+    first: Law
+    second: Law
+
+    @property
+    def factors(self) -> tuple[Law, ...]:
+        """Return the laws whose product it is."""
+        return tuple(self)
+
+    @property
+    def is_constant(self) -> bool:
+        """Tell whether no factor changes."""
+        return self.first.is_constant and self.second.is_constant
+
+    @property
+    def cycle(self) -> Period | None:
+        """Return the period that its factors share; None when it never changes."""
+        return shared_cycle(self)
+
+    def value(self, ctx: Any, t: Any, order: int = 0) -> Any:
+        """Evaluate the product, or a derivative, as `Law.value` does."""
+        return self._combined(order, lambda law, derived: law.value(ctx, t, derived))
+
+    def values(self, times: FloatArray, order: int = 0) -> FloatArray:
+        """Evaluate the product, or a derivative, as `Law.values` does."""
+        found: FloatArray = self._combined(order, lambda law, derived: law.values(times, derived))
+        return found
+
+    def _combined(self, order: int, at: Any) -> Any:
+        """Apply Leibniz's rule to the factors' derivatives, `at(law, order)`."""
+        terms = [
+            math.comb(order, k) * at(self.first, order - k) * at(self.second, k) for k in range(order + 1)
+        ]
+        return sum(terms[1:], terms[0])
+
+    def size_bounds(self) -> Bounds:
+        """Bound the product for all times, rounded outward by a few units in the last place."""
+        return bound.of_product(self.first.size_bounds(), self.second.size_bounds())
+
     def __call__(self, t: Any) -> Any:
-        """Return the value at a time, or an array of values at an array of times."""
-        return at(self, t)
+        """Return the value at a time or an array of times, as a law does."""
+        return _called(self, t)
 
 
-Law = float | Fourier | BangBang
+def law_of(given: float | Law) -> Law:
+    """Return the law that a table's field gives."""
+    return given if isinstance(given, Law) else Constant(given)
+
+
+def shared_cycle(laws: Iterable[Law]) -> Period | None:
+    """Return the period of the first law that moves, which all moving laws share; None if nothing moves."""
+    return next((law.cycle for law in laws if not law.is_constant), None)
+
+
+def first_origin(laws: Iterable[Law]) -> float:
+    """Return when a cycle begins [time]: at the first knot of the first law that has knots, else at 0."""
+    return next((law.origin for law in laws if law.origin is not None), 0.0)
+
+
+def times_power(number: float, exponent: int) -> float:
+    """Return a number times 2^exponent, infinite where that overflows.
+
+    The power itself need not be a float: 2^1000 times 2^-1080 is 2^-80, though 2^-1080 is rounded to 0.
+    """
+    try:
+        return math.ldexp(number, exponent)
+    except OverflowError:
+        return math.copysign(math.inf, number)
 
 
 def amplitudes(field: str, given: object) -> tuple[float, ...]:
@@ -137,7 +510,8 @@ def check_legs(knots: tuple[tuple[float, float], ...]) -> None:
     for i, ((before, _), (after, _)) in enumerate(itertools.pairwise(knots), 1):
         if after <= before:
             raise InvalidScene(f"bang-bang.knots[{i}] time = {after}, must be > {before}")
-    (start, first), (end, last) = knots[0], knots[-1]
+    start, first = knots[0]
+    end, last = knots[-1]
     if last != first:
         raise InvalidScene(
             f"bang-bang.knots[{len(knots) - 1}] value = {last}, must equal the first ({first}): no jumps"
@@ -147,320 +521,71 @@ def check_legs(knots: tuple[tuple[float, float], ...]) -> None:
         raise InvalidScene(f"bang-bang.knots span {start} to {end}: the period must be a binary64 number")
 
 
-class Period(NamedTuple):
-    """A common period: 2 pi / omega, kept symbolic, or an exact rational length [time]."""
-
-    omega: float | None
-    length: Fraction | None
-
-    def value(self, ctx: Any) -> Any:
-        """Return the period [time] in an mpmath number system."""
-        if self.length is not None:
-            return exact(ctx, self.length)
-        return 2 * ctx.pi / ctx.mpf(self.omega)
-
-
-class Quadratic(NamedTuple):
-    """c0 + c2 (t - origin)^2 until `end`, all exact rationals: a bang-bang law rests at its knots."""
-
-    origin: Fraction
-    c0: Fraction
-    c2: Fraction
-    end: Fraction
-
-
-Piece = float | Fourier | Quadratic
-
-
-class Bounds(NamedTuple):
-    """lowest <= f <= highest, |f'| <= slope, |f''| <= curvature at all times (rounded outward)."""
-
-    lowest: float
-    highest: float
-    slope: float
-    curvature: float
-
-
-def is_constant(law: Law) -> bool:
-    """Tell whether the law never changes."""
-    if isinstance(law, Fourier):
-        return not law.harmonics()
-    if isinstance(law, BangBang):
-        return all(value == law.knots[0][1] for _, value in law.knots)
-    return True
-
-
-def period_of(law: Law) -> Period | None:
-    """Return the period of a law that moves; None when it never changes."""
-    if is_constant(law):
-        return None
-    if isinstance(law, BangBang):
-        return Period(None, Fraction(law.knots[-1][0]) - Fraction(law.knots[0][0]))
-    assert isinstance(law, Fourier)
-    return Period(law.omega, None if law.period is None else Fraction(law.period))
-
-
-def shared_period(laws: Iterable[Law]) -> Period | None:
-    """Return the period of the first law that moves, which all moving laws share; None if nothing moves."""
-    return next((found for law in laws if (found := period_of(law)) is not None), None)
-
-
-def piece_at(law: Law, time: Fraction) -> Piece:
-    """Return the analytic piece that holds at `time` and just after it.
-
-    Args:
-        law: a sound law.
-        time: any exact time.
-
-    Returns:
-        A float (constant for ever), the Fourier law itself, or the Quadratic up to its end.
-    """
-    if isinstance(law, BangBang):
-        return law.knots[0][1] if is_constant(law) else leg_at(law, time)
-    if isinstance(law, Fourier):
-        return law.mean if is_constant(law) else law
-    return law
-
-
-@lru_cache(maxsize=64)
-def half_legs(law: BangBang) -> tuple[Quadratic, ...]:
-    """Return the parabolas of the period that begins at the first knot, also of a law at rest."""
-    found = []
-    for knot, next_knot in itertools.pairwise(law.knots):
-        (start, before), (stop, after) = map(Fraction, knot), map(Fraction, next_knot)
-        half_acceleration = 2 * (after - before) / (stop - start) ** 2
-        found.append(Quadratic(start, before, half_acceleration, (start + stop) / 2))
-        found.append(Quadratic(stop, after, -half_acceleration, stop))
-    return tuple(found)
-
-
-def leg_at(law: BangBang, time: Fraction) -> Quadratic:
-    """Return the half leg that holds at `time` and just after it."""
-    legs = half_legs(law)
-    start = legs[0].origin
-    shift = (time - start) // (legs[-1].end - start) * (legs[-1].end - start)
-    leg = legs[bisect_right(legs, time - shift, key=lambda leg: leg.end)]
-    return leg._replace(origin=leg.origin + shift, end=leg.end + shift)
-
-
-def breakpoints(law: Law) -> list[Fraction]:
-    """Return the times in one period, ends included, at which the law is not analytic."""
-    if not isinstance(law, BangBang):
-        return []
-    return [half_legs(law)[0].origin, *(leg.end for leg in half_legs(law))]
-
-
-def exact(ctx: Any, number: Fraction) -> Any:
-    """Bring a rational into a number system (in `iv`: an enclosure of it); for floats it is rounded once."""
-    if ctx.mpf is not float:
-        return ctx.mpf(number.numerator) / ctx.mpf(number.denominator)
-    try:
-        return float(number)  # its parts alone may be beyond any float, as those of a knot at 1e-310 are
-    except OverflowError:
-        return math.inf if number > 0 else -math.inf
-
-
-def _at_float(piece: Quadratic, t: float | FloatArray, order: int) -> Any:
-    """Evaluate a parabola whose curvature is beyond any float, exactly, and round once."""
-    if isinstance(t, np.ndarray):
-        return np.array([_at_float(piece, each, order) for each in t.ravel().tolist()]).reshape(t.shape)
-    x = Fraction(t) - piece.origin
-    found = (piece.c0 + piece.c2 * x**2, 2 * piece.c2 * x, 2 * piece.c2)
-    return exact(_Arrays, found[order])
-
-
-def evaluate(ctx: Any, piece: Piece, t: Any, order: int = 0) -> Any:
-    """Evaluate a piece, or its first or second derivative.
-
-    Args:
-        ctx: an mpmath context: mp, fp, iv, or a private one.
-        piece: from `piece_at`; the caller keeps t within it.
-        t: time, a number of ctx [time].
-        order: 0, 1 or 2.
-
-    Returns:
-        A number of ctx: [length], [length/time] or [length/time^2]; slopes and nu have no length.
-    """
-    if isinstance(piece, Quadratic):
-        x = t - exact(ctx, piece.origin)
-        c2 = exact(ctx, piece.c2)
-        if ctx.mpf is float and math.isinf(c2):
-            return _at_float(piece, t, order)
-        if order == 0:
-            return exact(ctx, piece.c0) + x * (x * c2)
-        return 2 * c2 * x + 0 if order == 1 else 2 * c2  # + 0: what rests has the rate 0, not minus 0
-    if isinstance(piece, Fourier):
-        return _trigonometric(ctx, piece, t, order)
-    return ctx.mpf(piece) if order == 0 else ctx.mpf(0)
-
-
-def frequency(ctx: Any, law: Fourier) -> Any:
-    """Return omega [1/time] in a number system; in `iv` an enclosure, since 2 pi / period is irrational."""
-    if law.period is not None:
-        return 2 * ctx.pi / ctx.mpf(law.period)
-    return ctx.mpf(law.omega)
-
-
-def _trigonometric(ctx: Any, law: Fourier, t: Any, order: int) -> Any:
-    total = ctx.mpf(law.mean) if order == 0 else ctx.mpf(0)
-    omega = frequency(ctx, law)
-    for k, c, s in law.harmonics():
-        rate = k * omega
-        cos, sin = ctx.cos_sin(rate * t)
-        if order == 1:
-            cos, sin = -rate * sin, rate * cos
-        elif order == 2:
-            cos, sin = -rate * rate * cos, -rate * rate * sin
-        if c:
-            total += ctx.mpf(c) * cos
-        if s:
-            total += ctx.mpf(s) * sin
-    return total
-
-
-def value(ctx: Any, law: Law, t: Any, order: int = 0) -> Any:
-    """Evaluate a law at a point (not an interval) of time, in `mp` or `fp`; at an array: `values`."""
-    if isinstance(t, np.ndarray):
-        return values(law, t, order)
-    if isinstance(law, BangBang):
-        time = Fraction(*map(int, t.as_integer_ratio()))  # of mpf the parts are integers of gmpy2
-        return evaluate(ctx, piece_at(law, time), t, order)
-    return evaluate(ctx, law, t, order)
-
-
-class _Arrays:
-    """A number system for `evaluate`: arrays of binary64."""
-
-    mpf, pi = float, math.pi
-
-    @staticmethod
-    def cos_sin(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return np.cos(x), np.sin(x)
-
-
-def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
-    """Evaluate a law, or its derivative of order 1 or 2, in binary64 at times of any shape.
-
-    Times since the first knot, phases and omega t are rounded as floats are.
-    """
-    if is_constant(law) or not isinstance(law, BangBang):
-        return np.full(times.shape, evaluate(_Arrays, piece_at(law, Fraction(0)), times, order))
-    knots = np.array([t for t, _ in law.knots])
-    phases = knots[0] + np.mod(times - knots[0], knots[-1] - knots[0])
-    legs = np.minimum(np.searchsorted(knots, phases, side="right"), len(knots) - 1) - 1
-    is_late = phases - knots[legs] >= knots[legs + 1] - phases  # the middle of a leg need not be a float
-    found = np.empty(times.shape)
-    for leg in np.unique(legs):
-        for piece, half in zip(half_legs(law)[2 * leg : 2 * leg + 2], (~is_late, is_late), strict=True):
-            those = (legs == leg) & half
-            found[those] = evaluate(_Arrays, piece, phases[those], order)
-    return found
-
-
-def at(law: Law, t: Any) -> Any:
-    """Return the value of a law at a time, or an array of values at an array of times of any shape.
-
-    Raises:
-        BadInput: a time is not a finite number.
-    """
+def _called(law: Law | Product, t: Any) -> Any:
+    """Evaluate a law for a user: at a time, or at an array of times of any shape."""
     try:
         times = np.asarray(t, np.float64)
     except (TypeError, ValueError):
         raise BadInput(f"t = {shown(t)}, must be finite numbers") from None
     if not np.isfinite(times).all():
         raise BadInput(f"t = {times[~np.isfinite(times)][0]}, must be finite")
-    found = values(law, times.reshape(-1)).reshape(times.shape)
+    found = law.values(times.reshape(-1)).reshape(times.shape)
     return found if times.ndim else float(found)
 
 
-def bounds(law: Law) -> Bounds:
-    """Bound a law and its derivatives for all times, rounded outward at every scale.
-
-    Sizes are summed as fractions in [1/2, 1) with an exponent apart, so nothing overflows or underflows
-    on the way, and a relative slack covers the roundings. Only the last step, which puts the exponent back,
-    may leave the range: it rounds up, to a subnormal number or to infinity.
-    """
-    if isinstance(law, BangBang):
-        values = [value for _, value in law.knots]
-        legs = [(abs(v1 - v0), t1 - t0) for (t0, v0), (t1, v1) in itertools.pairwise(law.knots)]
-        slope = max(_quotient_up(2.0, rise, duration) for rise, duration in legs)
-        curvature = max(_quotient_up(4.0, rise, duration, duration) for rise, duration in legs)
-        return Bounds(min(values), max(values), slope, curvature)
-    if not isinstance(law, Fourier):
-        return Bounds(law, law, 0.0, 0.0)
-    harmonics = law.harmonics()
-    if not harmonics:
-        return Bounds(law.mean, law.mean, 0.0, 0.0)
-    _, unit = math.frexp(max(max(abs(c), abs(s)) for _, c, s in harmonics))
-    omega, rate = _split_frequency(law)
-    terms = [(k * omega, math.hypot(math.ldexp(c, -unit), math.ldexp(s, -unit))) for k, c, s in harmonics]
-    swing = _up(sum(size for _, size in terms), unit)
-    slope = _up(sum(size * f for f, size in terms), unit + rate)
-    curvature = _up(sum(size * f * f for f, size in terms), unit + 2 * rate)
-    # The sum of two floats errs by half a unit of its last place, and not at all where it is subnormal.
-    lowest, highest = law.mean - swing, law.mean + swing
-    return Bounds(lowest - _slack(lowest, swing), highest + _slack(highest, swing), slope, curvature)
+# The same as functions of a law or a bare number, for callers that are not converted yet.
 
 
-def _split_frequency(law: Fourier) -> tuple[float, int]:
-    # omega = fraction 2^exponent to within a few roundings.
-    if law.period is not None:
-        fraction, exponent = math.frexp(law.period)
-        return 2 * math.pi / fraction, -exponent
-    assert law.omega is not None
-    return math.frexp(law.omega)
+def is_constant(law: float | Law) -> bool:
+    """Tell whether the law never changes."""
+    return law_of(law).is_constant
 
 
-def _quotient_up(factor: float, number: float, *divisors: float) -> float:
-    if math.isinf(number):  # a leg from one end of the range of floats to the other
-        return number
-    quotient, exponent = math.frexp(number)
-    for divisor in divisors:
-        fraction, shift = math.frexp(divisor)
-        quotient, exponent = quotient / fraction, exponent - shift
-    return _up(factor * quotient, exponent)
+def period_of(law: float | Law) -> Period | None:
+    """Return the period of a law that moves; None when it never changes."""
+    return law_of(law).cycle
 
 
-def _up(size: float, exponent: int) -> float:
-    # A few dozen roundings at most went into the size, each of relative size 2^-53.
-    size *= 1 + 2.0**-45
-    try:
-        number = math.ldexp(size, exponent)
-    except OverflowError:
-        return math.inf
-    return number if number >= LEAST_NORMAL or size == 0 else math.nextafter(number, math.inf)
+def shared_period(laws: Iterable[float | Law]) -> Period | None:
+    """Return the period of the first law that moves."""
+    return shared_cycle(map(law_of, laws))
 
 
-def _slack(level: float, swing: float) -> float:
-    return (abs(level) + swing) * 2.0**-50
+def piece_at(law: float | Law, time: Fraction) -> Piece:
+    """Return the analytic piece that holds at `time` and just after it."""
+    return law_of(law).piece_at(time)
 
 
-def size_bounds(law: Law) -> Bounds:
-    """Bound a law that is a size (radius, width, depth or nu), positive because its scene is valid.
-
-    `bounds` subtracts all amplitudes of a Fourier law from its mean. The result may be negative although the
-    law is not: 1 + 0.9 cos x - 0.35 cos 3x is above 0.1. Here the least value is never below 0; a lower bound
-    of 0 only says that the law is positive.
-    """
-    found = bounds(law)
-    if found.lowest > 0.0 or not isinstance(law, Fourier):
-        return found
-    return found._replace(lowest=_least_by_samples(law))
+def breakpoints(law: float | Law) -> list[Fraction]:
+    """Return the times in one period, ends included, at which the law is not analytic."""
+    return law_of(law).breakpoints()
 
 
-def _least_by_samples(law: Fourier) -> float:
-    """Bound a positive Fourier law from below by samples; return 0 if they do not show a positive bound.
+def evaluate(ctx: Any, piece: Piece, t: Any, order: int = 0) -> Any:
+    """Evaluate a piece, or its first or second derivative."""
+    return piece.evaluate(ctx, t, order)
 
-    Between samples at distance d, f is at least the lower neighbour minus max |f''| d^2 / 8. Units are the
-    mean, which is positive, and the phase.
-    """
-    waves = [(k, c / law.mean, s / law.mean) for k, c, s in law.harmonics()]
-    size = 1.0 + sum(k * (abs(c) + abs(s)) for k, c, s in waves)  # bounds what a rounded phase does, too
-    bend = sum(k * k * (abs(c) + abs(s)) for k, c, s in waves)
-    for n in (2**8, 2**11, 2**14, 2**17):
-        phases = np.arange(n) * (2.0 * np.pi / n)
-        least = float((1.0 + sum(c * np.cos(k * phases) + s * np.sin(k * phases) for k, c, s in waves)).min())
-        found = least - bend * (2.0 * np.pi / n) ** 2 / 8.0 - 2.0**-40 * size
-        if found > 0.5 * least:
-            return found * law.mean
-    return 0.0
+
+def value(ctx: Any, law: float | Law, t: Any, order: int = 0) -> Any:
+    """Evaluate a law at a point (not an interval) of time."""
+    return law_of(law).value(ctx, t, order)
+
+
+def values(law: float | Law, times: FloatArray, order: int = 0) -> FloatArray:
+    """Evaluate a law, or its derivative, in binary64 at times of any shape."""
+    return law_of(law).values(times, order)
+
+
+def bounds(law: float | Law) -> Bounds:
+    """Bound a law and its derivatives for all times."""
+    return law_of(law).bounds()
+
+
+def size_bounds(law: float | Law) -> Bounds:
+    """Bound a law that is a size."""
+    return law_of(law).size_bounds()
+
+
+def frequency(ctx: Any, law: Fourier) -> Any:
+    """Return omega [1/time] in a number system."""
+    return law.frequency(ctx)

@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import chebyshev
 
-from scene.laws import BangBang, Fourier, Law, bounds, breakpoints, is_constant, values
-from scene.tables import Mushroom, Scene, laws
+from scene.laws import Constant, Law, first_origin
+from scene.tables import Mushroom, Scene
 
 FloatArray = npt.NDArray[np.float64]
 # Returns a law, its first and its second derivative by the phase, shape (3, ...), at phases given.
@@ -32,8 +32,8 @@ TO_SERIES = np.linalg.inv(chebyshev.chebvander(NODES, DEGREE)).T
 
 
 def start_time(scene: Scene) -> float:
-    """Return when the cycle begins [time]: at the first knot of a bang-bang law, else at 0."""
-    return next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
+    """Return when the cycle begins [time]: at the first knot of a law that has knots, else at 0."""
+    return first_origin(scene.laws.values())
 
 
 def one_cycle(scene: Scene) -> float:
@@ -43,10 +43,9 @@ def one_cycle(scene: Scene) -> float:
 
 def mouth_factors(scene: Mushroom) -> tuple[Law, Law]:
     """Return two laws whose quotient is nu."""
-    if scene.nu is not None:
-        return scene.nu, 1.0
-    assert scene.w is not None
-    return scene.w, scene.r
+    if "nu" in scene.laws:
+        return scene.laws["nu"], Constant(1.0)
+    return scene.laws["w"], scene.laws["r"]
 
 
 @lru_cache(maxsize=256)
@@ -65,9 +64,10 @@ def mouth_minima(scene: Scene) -> tuple[float, ...]:
     if not isinstance(scene, Mushroom):
         return ()
     width, radius = mouth_factors(scene)
-    if is_constant(width) and is_constant(radius):
+    if width.is_constant and radius.is_constant:
         return ()
-    start, span = start_time(scene), scene.period
+    start = start_time(scene)
+    span = scene.period
     w, r = (_motion(law, start, span) for law in (width, radius))
     cuts = _cuts(start, span, (width, radius))
     # Legs too short for their squares give nan: their zeros drop out, their ends among the cuts stay.
@@ -85,19 +85,19 @@ def _in_cycle(phase: float) -> float:
 
 def _motion(law: Law, start: float, span: float) -> Motion:
     """Return a law's motion over a cycle, divided by its highest value: only the ratios of nu matter."""
-    highest = bounds(law).highest
+    highest = law.bounds().highest
 
     def motion(u: FloatArray) -> FloatArray:
-        return np.stack([values(law, start + span * u, order) / highest * span**order for order in range(3)])
+        return np.stack([law.values(start + span * u, order) / highest * span**order for order in range(3)])
 
     return motion
 
 
 def _cuts(start: float, span: float, factors: tuple[Law, Law]) -> FloatArray:
     """Return phases from 0 to 1 between which N is analytic and its waves make half a turn at most."""
-    waves = [law.harmonics() for law in factors if isinstance(law, Fourier) and law.harmonics()]
+    waves = [law.harmonics() for law in factors if law.harmonics()]
     parts = 2 * sum(harmonics[-1][0] for harmonics in waves)
-    knots = [float(t - Fraction(start)) / span for law in factors for t in breakpoints(law)]
+    knots = [float(t - Fraction(start)) / span for law in factors for t in law.breakpoints()]
     return np.unique(np.concatenate([np.linspace(0.0, 1.0, max(parts, 1) + 1), np.array(knots) % 1.0]))
 
 
@@ -108,7 +108,8 @@ def _slope(w: FloatArray, r: FloatArray) -> FloatArray:
 
 def _zeros(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
     """Return N's zeros, by Chebyshev series between neighbouring cuts."""
-    middle, half = 0.5 * (cuts[1:] + cuts[:-1]), 0.5 * np.diff(cuts)
+    middle = 0.5 * (cuts[1:] + cuts[:-1])
+    half = 0.5 * np.diff(cuts)
     places = middle[:, None] + half[:, None] * NODES
     series = _slope(w(places), r(places))[0] @ TO_SERIES
     sizes = np.abs(series)
@@ -129,33 +130,41 @@ def _zeros(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
 
 def _minima(w: Motion, r: Motion, phases: FloatArray) -> list[float]:
     """Return where nu is least in each of its valleys; it is monotone between neighbours among `phases`."""
-    at_w, at_r = w(phases), r(phases)
-    nu, slope = at_w[0] / at_r[0], np.abs(_slope(at_w, at_r)[0])
+    at_w = w(phases)
+    at_r = r(phases)
+    nu = at_w[0] / at_r[0]
+    slope = np.abs(_slope(at_w, at_r)[0])
     top = int(np.argmax(nu))
     small = SWING * nu[top]
     # Once round from the highest place to itself.
     order = np.append(np.arange(top, top + len(nu)), top) % len(nu)
     u = np.append(phases[order[:-1]] + (order[:-1] < top), phases[top] + 1.0)
     found: list[float] = []
-    is_falling, extreme, begin = True, nu[top], 0
+    is_falling = True
+    extreme = nu[top]
+    begin = 0
     for k, level in enumerate(nu[order]):
         if is_falling:
             extreme = min(extreme, level)
             if level > extreme + small:
                 low = [i for i in range(begin, k) if nu[order[i]] <= extreme + small]
                 found.append(_lowest(w, r, u[low], slope[order[low]]))
-                is_falling, extreme = False, level
+                is_falling = False
+                extreme = level
         else:
             extreme = max(extreme, level)
             if level < extreme - small:
-                is_falling, extreme, begin = True, level, k
+                is_falling = True
+                extreme = level
+                begin = k
     return found
 
 
 def _lowest(w: Motion, r: Motion, u: FloatArray, slope: FloatArray) -> float:
     """Return the middle of a plateau, else the place of least slope, of places equal within rounding."""
     middle = np.array([0.5 * (u[0] + u[-1])])
-    at_w, at_r = w(middle % 1.0), r(middle % 1.0)
+    at_w = w(middle % 1.0)
+    at_r = r(middle % 1.0)
     terms = np.abs(at_w[1] * at_r[0]) + np.abs(at_w[0] * at_r[1])
     is_plateau = np.abs(_slope(at_w, at_r)[0]) <= SWING * terms
     return float(middle[0]) if is_plateau else float(u[np.argmin(slope)])

@@ -7,7 +7,7 @@ import msgspec
 from mpmath import fp
 
 from scene.geometry import table_at
-from scene.tables import Scene, laws
+from scene.tables import Scene
 
 SIZE = 240  # of the picture [pixels]
 SHADES = ("#440154", "#31688e", "#35b779", "#b8b800")  # the walls at each quarter of the cycle
@@ -27,8 +27,8 @@ def of_scene(scene: Scene) -> str:
     """Return the laws of a scene and its walls at each quarter of the cycle."""
     span = scene.period
     shown: dict[str, object] = {}
-    for name, law in laws(scene).items():
-        data = msgspec.to_builtins(law)
+    for name, law in scene.laws.items():
+        data = msgspec.to_builtins(law.as_field())
         fields = data.items() if isinstance(data, dict) else ()
         told = [f"{key} = {field}" for key, field in fields if field not in (None, (), [])]
         shown[name] = ", ".join(told) or data

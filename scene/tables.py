@@ -17,19 +17,22 @@ repeated knots.
 """
 
 import re
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from functools import cached_property, lru_cache
 from numbers import Real
+from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
 import msgspec
 from mpmath import fp
 
-from scene.laws import BangBang, Fourier, Law, Period, at, shared_period
+from scene.laws import WRITTEN, Constant, GivenLaw, Law, Product, law_of, shared_cycle
+from scene.pieces import Period
 from scene.refusal import BadInput, InvalidScene, check_number, listed, shown
 from scene.validity import Condition, prove
 
 Wall = Literal["arc", "base", "left", "right", "floor"]
+KINDS = " or ".join(f"a {kind.__name__}" for kind in WRITTEN)
 PARAMETERS = ("r", "w", "nu", "h", "slope")
 # Controls but tab and line ends, lone surrogates, and what XML has no place for.
 HIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
@@ -39,6 +42,7 @@ class _Table(
     msgspec.Struct,
     frozen=True,
     cache_hash=True,  # steppers look up what they made of a scene at every step
+    dict=True,  # for `laws` and `width`, which no copy, comparison or file sees
     tag_field="table",
     forbid_unknown_fields=True,
     omit_defaults=True,
@@ -54,24 +58,45 @@ class _Table(
         """
         for field in (name for name in PARAMETERS if name in self.__struct_fields__):
             given = listed(getattr(self, field))
-            if isinstance(given, Fourier | BangBang) or (given is None and field in self.optional):
+            if given is None and field in self.optional:
+                continue
+            if isinstance(given, Law):
+                given = given.as_field()
+            if isinstance(given, WRITTEN):
                 continue
             if isinstance(given, bool) or not isinstance(given, Real):
-                raise InvalidScene(f"{field} = {shown(given)}, must be a number, a Fourier or a BangBang law")
+                raise InvalidScene(f"{field} = {shown(given)}, must be a number, {KINDS} law")
             msgspec.structs.force_setattr(self, field, check_number(field, given, InvalidScene))
         for field in ("name", "notes"):
             _check_text(field, getattr(self, field))
         _prove(type(self), tuple(getattr(self, name, None) for name in PARAMETERS))
 
+    @cached_property
+    def laws(self) -> Mapping[str, Law]:
+        """Return the laws that the table gives, by the names of its parameters."""
+        given = {name: getattr(self, name, None) for name in PARAMETERS}
+        return MappingProxyType({name: law_of(law) for name, law in given.items() if law is not None})
+
+    @cached_property
+    def width(self) -> Law | Product:
+        """Return the half-width w of the mouth, as a law or as nu r; 0 in a cap [length]."""
+        if "nu" in self.laws:
+            return Product(self.laws["nu"], self.laws["r"])
+        return self.laws.get("w", Constant(0.0))
+
+    @cached_property
+    def cycle(self) -> Period | None:
+        """Return the period that all moving laws share; None for a static table."""
+        return shared_cycle(self.laws.values())
+
     @property
     def period(self) -> float:
         """Return the period of the moving laws [time], 0 if nothing moves."""
-        shared = period(self)  # type: ignore[arg-type]
-        return float(shared.value(fp)) if shared else 0.0
+        return float(self.cycle.value(fp)) if self.cycle else 0.0
 
     def at(self, t: Any) -> dict[str, Any]:
         """Return the value of each law, by name, at a time or at an array of times (`Fourier`)."""
-        return {name: at(law, t) for name, law in laws(self).items()}  # type: ignore[arg-type]
+        return {name: law(t) for name, law in self.laws.items()}
 
 
 def _check_text(field: str, text: object) -> None:
@@ -87,7 +112,7 @@ class Cap(_Table, frozen=True, tag="cap", kw_only=True):
     """The half disk x^2 + y^2 <= r^2, y >= 0 (the breathing circle of sec. 3.1, folded)."""
 
     walls: ClassVar[tuple[Wall, ...]] = ("arc", "base")
-    r: Law
+    r: GivenLaw
     name: str = ""
     notes: str = ""
 
@@ -96,9 +121,9 @@ class Stem(_Table, frozen=True, tag="stem", kw_only=True):
     """The trapezoid |x| <= w + slope y, -h <= y <= 0; with slope 0 the Fermi-Ulam rectangle."""
 
     walls: ClassVar[tuple[Wall, ...]] = ("base", "left", "right", "floor")
-    w: Law
-    h: Law
-    slope: Law = 0.0
+    w: GivenLaw
+    h: GivenLaw
+    slope: GivenLaw = 0.0
     name: str = ""
     notes: str = ""
 
@@ -108,11 +133,11 @@ class Mushroom(_Table, frozen=True, tag="mushroom", kw_only=True):
 
     walls: ClassVar[tuple[Wall, ...]] = ("arc", "base", "left", "right", "floor")
     optional: ClassVar[tuple[str, ...]] = ("w", "nu")
-    r: Law
-    h: Law
-    w: Law | None = None
-    nu: Law | None = None
-    slope: Law = 0.0
+    r: GivenLaw
+    h: GivenLaw
+    w: GivenLaw | None = None
+    nu: GivenLaw | None = None
+    slope: GivenLaw = 0.0
     name: str = ""
     notes: str = ""
 
@@ -136,13 +161,13 @@ def check_scene(scene: object) -> None:
     raise BadInput(f"scene = {shown(scene)}, must be a Cap, a Stem or a Mushroom{hint}")
 
 
-def laws(scene: Scene) -> dict[str, Law]:
-    """Return the laws the scene gives, by parameter name."""
+def laws(scene: Scene) -> dict[str, GivenLaw]:
+    """Return the laws as the scene gives them, by parameter name."""
     found = ((name, getattr(scene, name, None)) for name in PARAMETERS)
     return {name: law for name, law in found if law is not None}
 
 
-def width_factors(scene: Stem | Mushroom) -> tuple[Law, ...]:
+def width_factors(scene: Stem | Mushroom) -> tuple[GivenLaw, ...]:
     """Return the laws whose product is the half-width w(t) of the mouth: (w,) or (nu, r)."""
     if isinstance(scene, Mushroom) and scene.nu is not None:
         return (scene.nu, scene.r)
@@ -152,14 +177,14 @@ def width_factors(scene: Stem | Mushroom) -> tuple[Law, ...]:
 
 def period(scene: Scene) -> Period | None:
     """Return the period that all moving laws of a scene share; None for a static table."""
-    return shared_period(laws(scene).values())
+    return scene.cycle
 
 
 @lru_cache(maxsize=4096)
-def _prove(table: type[_Table], given: tuple[Law | None, ...]) -> None:
+def _prove(table: type[_Table], given: tuple[GivenLaw | None, ...]) -> None:
     # Cached by value: -0.0 and 0.0 count as equal, and validity is a matter of real numbers. A refusal is
     # not kept, so its message shows the numbers at hand.
-    found = {name: law for name, law in zip(PARAMETERS, given, strict=True) if law is not None}
+    found = {name: law_of(law) for name, law in zip(PARAMETERS, given, strict=True) if law is not None}
     if table is Mushroom and (("w" in found) == ("nu" in found)):
         raise InvalidScene("a mushroom needs exactly one of `w` and `nu`")
     prove(found, _conditions(found))
@@ -172,7 +197,7 @@ def _conditions(found: dict[str, Law]) -> list[Condition]:
         return listed
     width: tuple[Law, ...] = (found["nu"], found["r"]) if "nu" in found else (found["w"],)
     if "nu" in found:
-        listed.append(Condition("nu <= 1", ((1, (1.0,)), (-1, (found["nu"],))), is_strict=False))
+        listed.append(Condition("nu <= 1", ((1, (Constant(1.0),)), (-1, (found["nu"],))), is_strict=False))
     elif "r" in found:
         listed.append(Condition("w <= r", ((1, (found["r"],)), (-1, width)), is_strict=False))
     return [*listed, Condition("w > h slope", ((1, width), (-1, (found["h"], found["slope"]))))]

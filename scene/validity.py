@@ -25,26 +25,16 @@ import numpy as np
 
 from scene import exact
 from scene.exact import half_angle, leg_intervals, leg_polynomial, one_plus_square
-from scene.laws import (
-    BangBang,
-    Law,
-    Period,
-    bounds,
-    evaluate,
-    exact as number,
-    is_constant,
-    period_of,
-    piece_at,
-    shared_period,
-    value,
-    values,
-)
+from scene.laws import Constant, Law, first_origin, shared_cycle
+from scene.pieces import Period, exact as number
 from scene.precision import decimals, intervals
 from scene.refusal import InvalidScene
 
 MAX_BOXES = 8_000  # a scene with 512 half legs needs one to some for each, at up to 3 ms
 MAX_HALVINGS = 64  # laws that keep apart by 2^-120 of their size are still told apart
 BITS = 256  # a time may be 2^53 periods, of which no digit that counts is lost
+
+NOTHING = Constant(0.0)
 
 Laws = Mapping[str, Law]
 Interval = Any  # mpmath's, which has no type stubs
@@ -72,7 +62,7 @@ def prove(laws: Laws, conditions: Sequence[Condition]) -> None:
     check_common_period(laws)
     positive: set[Law] = set()
     for condition in conditions:
-        kept = [(sign, factors) for sign, factors in condition.terms if 0.0 not in factors]
+        kept = [(sign, factors) for sign, factors in condition.terms if NOTHING not in factors]
         if [sign for sign, _ in kept] == [1] and positive.issuperset(kept[0][1]):
             continue  # a product of laws known to be positive
         _check(laws, condition)
@@ -86,7 +76,7 @@ def check_common_period(laws: Laws) -> None:
     Raises:
         InvalidScene: naming two of them, their periods and what to do.
     """
-    moving = {name: shared for name, law in laws.items() if (shared := period_of(law)) is not None}
+    moving = {name: law.cycle for name, law in laws.items() if law.cycle is not None}
     for (first, a), (second, b) in itertools.combinations(moving.items(), 2):
         if a != b:
             ctx = decimals()
@@ -104,7 +94,7 @@ def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
         return (
             f"{by_omega} gives omega, so its period is irrational: give it period = {float(length)} instead"
         )
-    if isinstance(laws[first], BangBang) and isinstance(laws[second], BangBang):
+    if laws[first].breakpoints() and laws[second].breakpoints():
         return "repeat the knots of the shorter, or let it rest until the longer ends"
     return (
         "let both have a period that holds a whole number of each,"
@@ -120,7 +110,7 @@ def _is_clear(condition: Condition) -> bool:
     for sign, factors in condition.terms:
         ends = [level(sign)]
         for law in factors:
-            lowest, highest, *_ = bounds(law)
+            lowest, highest, *_ = law.bounds()
             if not (isfinite(lowest) and isfinite(highest)):
                 return False
             ends = [end * level(bound) for end in ends for bound in (lowest, highest)]
@@ -131,9 +121,9 @@ def _is_clear(condition: Condition) -> bool:
 def _check(laws: Laws, condition: Condition) -> None:
     if _is_clear(condition):
         return
-    used = [law for _, factors in condition.terms for law in factors if not is_constant(law)]
-    legs = [law for law in used if isinstance(law, BangBang)]
-    if 0 < len(legs) < len(used):
+    used = [law for _, factors in condition.terms for law in factors if not law.is_constant]
+    legs = [law for law in used if law.breakpoints()]
+    if not (all(law.is_polynomial for law in used) or all(law.is_trigonometric for law in used)):
         verdict = sign_on_legs(condition.terms, condition.is_strict, leg_intervals(legs))
         if verdict.holds is None:
             raise InvalidScene(
@@ -185,21 +175,26 @@ def sign_on_legs(terms: Terms, is_strict: bool, legs: Iterable[tuple[Fraction, F
 def enclose(terms: Terms, m: Fraction, h: Fraction) -> tuple[Interval, Interval]:
     """Enclose the sum of sign * product(laws) at m, and within h of m on the pieces that hold at m."""
     ctx = intervals(BITS)
-    t, away = number(ctx, m), number(ctx, h) * ctx.mpf([-1, 1])
-    total, total_rate = ctx.mpf(0), ctx.mpf(0)
+    t = number(ctx, m)
+    away = number(ctx, h) * ctx.mpf([-1, 1])
+    total = ctx.mpf(0)
+    total_rate = ctx.mpf(0)
     for sign, laws in terms:
-        at_m, rate = ctx.mpf(sign), ctx.mpf(0)
+        at_m = ctx.mpf(sign)
+        rate = ctx.mpf(0)
         for law in laws:
-            piece = piece_at(law, m)
-            factor, factor_rate = evaluate(ctx, piece, t), evaluate(ctx, piece, t + away, 1)
+            piece = law.piece_at(m)
+            factor = piece.evaluate(ctx, t)
+            factor_rate = piece.evaluate(ctx, t + away, 1)
             rate = rate * (factor + away * factor_rate) + (at_m + away * rate) * factor_rate
             at_m = at_m * factor
-        total, total_rate = total + at_m, total_rate + rate
+        total = total + at_m
+        total_rate = total_rate + rate
     return total, total + away * total_rate
 
 
 def _on_legs(
-    condition: Condition, legs: Sequence[BangBang]
+    condition: Condition, legs: Sequence[Law]
 ) -> Iterator[tuple[exact.Polynomial, Fraction, Fraction]]:
     for a, b in leg_intervals(legs):
         total: exact.Polynomial = []
@@ -235,9 +230,9 @@ def _least(condition: Condition, start: float, span: float, n: int) -> Sequence[
     if not abs(start) + span < 2.0**18 * span:
         return range(n)
     times = start + span * (np.arange(n) / n)
-    sizes = (prod(max(map(abs, bounds(law)[:2])) for law in factors) for _, factors in condition.terms)
+    sizes = (prod(max(map(abs, law.bounds()[:2])) for law in factors) for _, factors in condition.terms)
     with np.errstate(all="ignore"):
-        found = sum(sign * prod(values(law, times) for law in factors) for sign, factors in condition.terms)
+        found = sum(sign * prod(law.values(times) for law in factors) for sign, factors in condition.terms)
         near = np.min(found) + 2.0**-20 * sum(sizes)
     return np.flatnonzero(found <= near).tolist() if near < inf else range(n)
 
@@ -245,19 +240,19 @@ def _least(condition: Condition, start: float, span: float, n: int) -> Sequence[
 def _message(laws: Laws, condition: Condition, known: Fraction | None = None) -> str:
     # The proof is done; this only looks for an instant to show in the message. In mp no scene overflows.
     ctx = decimals()
-    shared = shared_period(laws.values())
+    shared = shared_cycle(laws.values())
     span, n = (shared.value(ctx), 512) if shared else (ctx.mpf(0), 1)
-    start = next((law.knots[0][0] for law in laws.values() if isinstance(law, BangBang)), 0.0)
+    start = first_origin(laws.values())
     times = [ctx.mpf(start) + span * i / n for i in _least(condition, start, float(span), n)]
     if known is not None:
         times.append(number(ctx, known))
 
     def excess(t: Any) -> Any:
-        return sum(sign * prod(value(ctx, f, t) for f in factors) for sign, factors in condition.terms)
+        return sum(sign * prod(f.value(ctx, t) for f in factors) for sign, factors in condition.terms)
 
     def shown(x: Any) -> str:
         return str(ctx.nstr(x, 6))
 
     worst = min(times, key=excess)
-    places = ", ".join(f"{name} = {shown(value(ctx, law, worst))}" for name, law in laws.items())
+    places = ", ".join(f"{name} = {shown(law.value(ctx, worst))}" for name, law in laws.items())
     return f"{condition.text} fails by {shown(excess(worst))} near t = {shown(worst)}, where {places}"

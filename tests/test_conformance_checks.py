@@ -1,5 +1,6 @@
 """Parts of the checks, one by one: what is drawn, and what is said of answers that are given by hand."""
 
+import json
 import math
 import re
 from types import SimpleNamespace
@@ -8,16 +9,27 @@ from typing import Any
 import msgspec
 import pytest
 from mpmath import fp
+from support.faulty_steppers import faulty
 
 from conformance.cases.draw import Draw
 from conformance.profiles import margin
 from conformance.suite import pytest_plugin
-from conformance.suite.checks import bad_input, flows, form, path_judge, spelling, timing
+from conformance.suite.checks import (
+    bad_input,
+    checks_of,
+    flows,
+    form,
+    path_judge,
+    run_check,
+    spelling,
+    timing,
+)
 from conformance.suite.checks.form import Implementation, octaves
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import graded_parts
+from conformance.suite.session import Session
 from conformance.vectors import Vector, question
-from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, load
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, from_data, load
 from scene.geometry import area, table_at
 from scene.laws import bounds
 from scene.protocol.messages import Introduction
@@ -70,9 +82,12 @@ AMONG = {
 
 
 @pytest.mark.parametrize("name", AMONG)
-def test_a_state_is_answered_among_others_as_alone(name):
+def test_a_state_is_answered_among_others_as_alone(name, monkeypatch):
     alone, among, said = AMONG[name]
-    side = SimpleNamespace(flown=lambda _, states, __: [alone if len(states) == 1 else among] * len(states))
+    side = Implementation(Session(lambda _: b""), "flow")
+    monkeypatch.setattr(
+        side, "flown", lambda _, states, __: [alone if len(states) == 1 else among] * len(states)
+    )
     if isinstance(said, bool):
         assert flows.together(side, SCENE, [START], [0, 0], 1.0) == said
     else:
@@ -106,9 +121,11 @@ PATHS = [
 
 
 @pytest.mark.parametrize(("steps", "n", "said"), PATHS, ids=range(len(PATHS)))
-def test_a_path_has_as_many_steps_as_asked_for_or_ends(steps, n, said):
+def test_a_path_has_as_many_steps_as_asked_for_or_ends(steps, n, said, monkeypatch):
     """A stepper whose steps go on without end is refused, and so is one that stops short."""
-    side = Implementation(SimpleNamespace(ask=lambda _: {"seq": 0, "steps": steps}), "trajectory")
+    session = Session(lambda _: b"")
+    monkeypatch.setattr(session, "ask", lambda _: {"seq": 0, "steps": steps})
+    side = Implementation(session, "trajectory")
     if said is None:
         assert len(side.path(SCENE, START, n)) == len(steps)
     else:
@@ -446,3 +463,77 @@ def test_a_bad_option_of_the_plugin_is_refused_by_its_name(changes, said):
     else:
         with pytest.raises(pytest.UsageError, match=re.escape(said)):
             pytest_plugin.pytest_configure(config)
+
+
+class SlowSession(Session):
+    """A session with a right stepper that takes `pace` seconds for a hit, by a clock that is not waited for.
+
+    A flow is taken to have as many hits as its particles could cross their table.
+    """
+
+    def __init__(self, pace: float) -> None:
+        super().__init__(faulty(lambda request, answer: answer(request)))
+        self.pace = pace
+        self.longest = 0.0
+        self.start()
+
+    def _exchange(self, line: bytes) -> bytes:
+        answer = super()._exchange(line)
+        self.seconds = self.pace * hits_of(json.loads(line), json.loads(answer))
+        if self.seconds > self.limits.timeout:
+            raise CheckFailure("timed-out", f"{self.seconds:g} s")
+        self.longest = max(self.longest, self.seconds)
+        return answer
+
+
+def hits_of(request: dict[str, Any], answer: dict[str, Any]) -> float:
+    if request["cmd"] == "trajectory":
+        return len(answer["steps"])
+    if request["cmd"] != "flow":
+        return 1
+    scene, states = from_data(request["scene"]), [State(**state) for state in request["states"]]
+    flown = [max(0.0, request["t_end"] - state.t) / path_judge.crossing(scene, state) for state in states]
+    return 1 + sum(flown)
+
+
+SLOW = (
+    *(f"promise/{name}" for name in ("long-paths", "long-flow", "many-particles")),
+    f"profile/{flows.PROFILES[0]}",
+)
+
+
+@pytest.mark.parametrize("pace", [0.02, 0.2])
+@pytest.mark.parametrize("name", SLOW)
+def test_a_slow_stepper_is_asked_for_what_it_answers_in_time(name, pace, monkeypatch):
+    """Its paths, flows and ensembles are shorter than those of a fast one, and its result says so."""
+    if name.startswith("profile/"):
+        pace *= 20  # the energies are low
+        monkeypatch.setitem(flows.SIZES, "core", flows.Size(300, 50.0, 0.5))
+    check = next(check for check in checks_of() if check.name == name)
+    with SlowSession(pace) as slow, SlowSession(0.0) as prompt:
+        found, usual = run_check(check, slow, 1), run_check(check, prompt, 1)
+    assert (found.verdict, usual.verdict) == ("pass", "pass"), found.why
+    assert "not asked" not in usual.why
+    assert name.startswith("profile/") or "not asked" in found.why
+    assert slow.longest > slow.limits.timeout / 64
+    assert prompt.n_restarts == slow.n_restarts == 0
+
+
+def test_a_stepper_that_becomes_slow_is_timed_out():
+    """The paths before do not excuse it."""
+
+    class Tired(SlowSession):
+        def _exchange(self, line: bytes) -> bytes:
+            self.pace = 1.0 if json.loads(line).get("collisions", 0) > 2000 else 1e-4
+            return super()._exchange(line)
+
+    check = next(check for check in checks_of() if check.name == "promise/long-paths")
+    with Tired(1e-4) as session:
+        assert run_check(check, session, 1).verdict == "timed-out"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "n"), [(0.0, flows.BATCH), (1e-3, flows.BATCH), (1.0, 30), (7.0, 4), (100.0, 1)]
+)
+def test_an_ensemble_is_cut_by_the_time_of_a_particle(seconds, n):
+    assert flows.batch_size(seconds, 120.0) == n

@@ -5,11 +5,11 @@ import math
 import re
 import secrets
 from contextlib import nullcontext, suppress
-from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import msgspec
+import psutil
 import pytest
 from support import faults
 from support.depth import deep_among
@@ -84,12 +84,13 @@ def verdicts(monkeypatch):
     return run
 
 
-def alive(token: str) -> list[str]:
+def alive(token: str) -> list[int]:
     """List the processes whose environment or arguments hold the token."""
     found = []
-    for file in [*Path("/proc").glob("[0-9]*/environ"), *Path("/proc").glob("[0-9]*/cmdline")]:
-        with suppress(OSError):  # it has ended, or is another user's
-            found += [file.parent.name] if token.encode() in file.read_bytes() else []
+    for process in psutil.process_iter():
+        with suppress(psutil.Error):  # it has ended, or is another user's
+            texts = [*process.cmdline(), *process.environ().values()]
+            found += [process.pid] if any(token in text for text in texts) else []
     return found
 
 

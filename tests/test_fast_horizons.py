@@ -19,8 +19,8 @@ from scene import (
     Cap,
     Collision,
     Fourier,
+    GivenLaw,
     Horizon,
-    Law,
     Mushroom,
     Scene,
     State,
@@ -134,7 +134,7 @@ def beside_a_moving_mouth(random: np.random.Generator) -> Question:
     period = float(random.choice([1.0, 0.3, 2.0**-6]))
     if random.random() < 0.5:
         turns = int(random.integers(0, 6))
-        w: Law = Fourier(
+        w: GivenLaw = Fourier(
             0.5, period=period, cos=(0.0,) * turns + (0.1,), sin=(float(random.uniform(-0.2, 0.2)),)
         )
     else:

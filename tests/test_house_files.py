@@ -25,14 +25,14 @@ LONGER = {"conformance/verify.py": "one file that anyone can read and run, witho
 # last raise, so that a mend never waits for a bound. A bound rises in the commit that adds a capability, and
 # that commit says why. Tests have none: a regression test never has to buy its place.
 MAX_STATEMENTS = {
-    "scene": 1_746,
-    "reference": 1_346,
-    "fast": 3_580,
+    "scene": 1_980,
+    "reference": 1_450,
+    "fast": 3_728,
     "theory": 2_147,
-    "conformance": 7_934,
-    "mushrooms": 5_583,
+    "conformance": 8_079,
+    "mushrooms": 6_012,
     "docs": 242,
-    ".ci": 41,
+    ".ci": 65,
     "tests": math.inf,
 }
 MAX_ARGUMENTS = 8  # of a kernel: what belongs together is a record

@@ -281,8 +281,9 @@ def test_a_variable_that_a_library_cannot_read_is_named_in_a_line(tmp_path, vari
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == code, done.stderr
     assert done.stderr.startswith("mushrooms: ")
-    assert done.stderr.count("\n") == 1
-    assert all(word in done.stderr for word in words)
+    told = [line for line in done.stderr.splitlines() if not line.startswith("compiling the fast stepper")]
+    assert len(told) == 1
+    assert all(word in told[0] for word in words)
 
 
 def test_a_path_whose_bytes_are_no_letters_is_printed_so_that_a_shell_takes_it(tmp_path):

@@ -14,12 +14,13 @@ import pyarrow.parquet
 import pytest
 import zarr
 from support.depth import deep_but
+from support.options import draw_options
 from support.refusals import assert_refused
 
 import fast
 import mushrooms
 from mushrooms import draw
-from mushrooms.audit import ensemble_command
+from mushrooms.audit import ensemble_table
 from mushrooms.main import run
 from mushrooms.store import export as exports
 from mushrooms.store.run import open_run
@@ -111,19 +112,19 @@ def of_dataset(_folder):
 
 
 def of_csv(folder):
-    exports.export_run(Path("run"), folder / "again.csv")
+    exports.export_run(exports.ExportOptions(run=Path("run"), to=folder / "again.csv"))
     return np.genfromtxt(folder / "again.csv", delimiter=",", names=True)["cycle_energies_1"]
 
 
 def of_npz(folder):
-    exports.export_run(Path("run"), folder / "again.npz")
+    exports.export_run(exports.ExportOptions(run=Path("run"), to=folder / "again.npz"))
     return np.load(folder / "again.npz")["energy"]
 
 
 def of_audit(path, energy=None):
     def read(_folder):
-        options = ensemble_command.Options(energy, "v2/2", None, None)
-        given, _notes = ensemble_command.read(Path(path), load("moving-cap"), options)
+        options = ensemble_table.Reading(energy, "v2/2", None, None)
+        given, _notes = ensemble_table.read(Path(path), load("moving-cap"), options)
         return ENERGY * np.exp(given.s)
 
     return read
@@ -133,7 +134,7 @@ def of_picture(folder):
     drawn = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(draw, "draw_energies", lambda _path, _spec, gains, _n: drawn.extend(gains))
-        draw.draw_scene("run", folder / "a.svg", [], None, draw.DrawOptions(*[None] * 6))
+        draw.draw_scene(draw_options(scene="run", out=folder / "a.svg"))
     return ENERGY * np.exp(np.concatenate(drawn)[:, 0])
 
 

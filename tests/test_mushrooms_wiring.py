@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import zarr
 from pyarrow import parquet
+from support.options import draw_options
 from support.refusals import assert_refused, one_line
 
 import fast
@@ -129,7 +130,7 @@ def test_a_stored_run_is_the_one_at_once(reopened):
 def test_an_export_has_every_result_and_nothing_internal(reopened, tmp_path, capsys):
     files = [tmp_path / f"a.{kind}" for kind in ("csv", "parquet", "npz")]
     for file in files:
-        exports.export_run(reopened.folder, file)
+        exports.export_run(exports.ExportOptions(run=reopened.folder, to=file))
     assert capsys.readouterr().out.split() == list(map(str, files))
     wanted = [
         "particle", *(f"cycle_energies_{k}" for k in (1, 2)), "t", "x", "y", "vx", "vy",
@@ -373,7 +374,7 @@ def test_each_kind_of_picture_is_drawn_by_its_function(command_line, tmp_path, d
 def test_growth_is_of_those_that_take_part(monkeypatch):
     asked = []
     monkeypatch.setattr(energies, "growth", lambda *given: asked.append(given))
-    options = draw.DrawOptions(50.0, None, 2, 30, 4, None)
+    options = draw_options(energy=50.0, cycles=2, particles=30, seed=4)
     island = scenes.Mushroom(r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (0.2,)), name="island")
     draw._growth(island, options)
     [(scene, energy, gains, n)] = asked
@@ -390,7 +391,7 @@ def test_exponents_tell_how_far_they_are(monkeypatch):
     monkeypatch.setattr(
         pictures, "exponents", lambda found, report: seen.append(len(found)) or report(7) or "it"
     )
-    assert draw._figure("lyapunov", STEM, draw.DrawOptions(*[None] * 6)) == "it"
+    assert draw._figure("lyapunov", STEM, draw_options()) == "it"
     assert seen == [2]
 
 

@@ -12,6 +12,7 @@ from reference.arithmetic import Arithmetic, Exhausted, Interval, is_below
 from reference.course import Course
 from reference.isolation import Isolator
 from reference.jets import Jet
+from reference.prepared import prepare
 from reference.timeline import Timeline
 from scene import Rejected, State, Undecided, Undefined, Wall, from_data
 
@@ -160,7 +161,7 @@ def test_the_mouth_is_crossed_at_a_time_ahead_or_never(y: float, vy: float, time
 def test_a_straight_wall_at_rest_is_met_at_a_time_ahead_or_never(
     scene: dict[str, Any], start: dict[str, Any], wall: Wall, time: float | None
 ) -> None:
-    assert rational.straight_time(from_data(scene), State(**start), wall) == time
+    assert rational.straight_time(prepare(from_data(scene)), State(**start), wall) == time
 
 
 @pytest.mark.parametrize("ends", [(0.3, 1.0), (0.1, 1.9), (0.0, 1.3), (0.7, 1.0)])
@@ -170,7 +171,7 @@ def test_where_f_vanishes_half_way_the_wider_part_is_cut(ends: tuple[float, floa
     a, b = map(exact.number, ends)
     middle = exact.middle(exact.hull(a, b))
     begin, one = exact.number(-1), exact.number(1)
-    still = Timeline(exact, from_data(CAP), Fraction(0))
+    still = Timeline(exact, prepare(from_data(CAP)), Fraction(0))
     search = Isolator(exact, lambda s: Jet(s - middle, one, exact.zero), begin, timeline=still)
     is_left_wider = is_below(b - middle, middle - a)
     assert is_left_wider == (ends in [(0.3, 1.0), (0.1, 1.9)])

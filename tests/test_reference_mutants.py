@@ -46,7 +46,6 @@ from scene import (
     Undefined,
     load,
 )
-from scene.laws import value
 
 FAR = 1e300  # the horizon of a path that is followed without one [time]
 TILTING = Mushroom(
@@ -121,7 +120,7 @@ def starts_where_a_wall_turns():
     for t, r in waves:
         opposite = Fourier(1.0, period=r.period, cos=[-a for a in r.cos], sin=[-b for b in r.sin])
         for law, expected in ((r, reference.Horizon), (opposite, Undefined)):
-            start = State(t, 0.0, float(value(mpmath.mp, law, t)), 0.0, 0.0, "arc")
+            start = State(t, 0.0, float(law.value(mpmath.mp, t)), 0.0, 0.0, "arc")
             assert isinstance(reference.next_collision(Cap(r=law), start, t + 0.125), expected)
 
 
@@ -474,13 +473,13 @@ def width_at_departure(honest, self, crossing):
 
 
 @faults.replacing(Course, "__init__")
-def with_a_later_horizon(honest, self, scene, motion, leaving, is_flat, in_cap, end, exact):
-    honest(self, scene, motion, leaving, is_flat, in_cap, None if end is None else end + 9, exact)
+def with_a_later_horizon(honest, self, table, motion, leaving, is_flat, in_cap, end, exact):
+    honest(self, table, motion, leaving, is_flat, in_cap, None if end is None else end + 9, exact)
 
 
 @faults.replacing(Course, "_beyond_crossing")
 def open_always(honest, self, crossing):
-    if not isinstance(self.scene, Mushroom):
+    if not self.table.is_mushroom:
         return honest(self, crossing)
     walls = SIDES if self.in_cap else ("arc",)
     return self._first_hit(walls, self.arithmetic.lower(crossing), None)
@@ -511,7 +510,7 @@ def still_slope(honest, self, name, s):
 
 @faults.replacing(MovingWalls, "width")
 def width_with_still_nu(honest, self, s):
-    if "nu" not in self.timeline.laws:
+    if "nu" not in self.table.width:
         return honest(self, s)
     nu, r = self.law("nu", s), self.law("r", s)
     return Jet(nu.f * r.f, nu.f * r.d1, self.arithmetic.zero)
@@ -530,7 +529,7 @@ def hessian_without_time(honest, self, wall, s):
 
 
 @faults.replacing(start, "_judge_on_base")
-def base_without_an_end(honest, scene, state, motion):
+def base_without_an_end(honest, table, state, motion):
     """The arc is asked only whether the state is surely beyond it."""
     if sign(motion.wall("arc", motion.arithmetic.zero).f) < 0:
         raise InvalidState("beyond wall arc")
@@ -545,8 +544,8 @@ def powers_of_later_times(honest, self, away):
 
 
 @faults.replacing(timeline.Timeline, "__init__")
-def half_a_turn(honest, self, arithmetic, scene, instant):
-    honest(self, arithmetic, scene, instant)
+def half_a_turn(honest, self, arithmetic, table, instant):
+    honest(self, arithmetic, table, instant)
     self.turn = None if self.turn is None else self.turn / 2
 
 

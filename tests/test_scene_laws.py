@@ -14,29 +14,17 @@ from mpmath import MPContext, MPIntervalContext, fp, mpf
 from support.depth import deep_but
 from support.refusals import one_line
 
-import scene
 from conformance.strategies import laws
-from scene import BangBang, Cap, Fourier, Law, Stem, mpmath_internals as raw
+from scene import BangBang, Cap, Constant, Fourier, Law, Stem, bounds, mpmath_internals as raw
+from scene.bounds import LEAST_NORMAL, Bounds, round_up
 from scene.exact import Sturm, add, at, multiply, negative_point, root_bound, scale, vanishes
-from scene.laws import (
-    LEAST_NORMAL,
-    Bounds,
-    Quadratic,
-    _up,
-    bounds,
-    breakpoints,
-    evaluate,
-    exact,
-    frequency,
-    is_constant,
-    piece_at,
-    value,
-    values,
-)
+from scene.laws import law_of
+from scene.pieces import exact
 
 LEGS = BangBang(knots=((0.0, 1.0), (0.25, 0.3), (0.5, 0.3), (0.75, 1.0), (1.0, 1.0)))
 times = st.floats(-1e3, 1e3)
-moving = laws().filter(lambda law: not is_constant(law))
+drawn = laws().map(law_of)
+moving = drawn.filter(lambda law: not law.is_constant)
 
 
 def context(digits):
@@ -49,55 +37,55 @@ def test_a_fourier_law_is_its_sum():
     law = Fourier(mean=0.5, omega=2.0, cos=(0.25,), sin=(0.125, 0.0625))
     t = 0.7
     expected = 0.5 + 0.25 * math.cos(1.4) + 0.125 * math.sin(1.4) + 0.0625 * math.sin(2.8)
-    assert value(fp, law, t) == pytest.approx(expected, rel=1e-15)
+    assert law.value(fp, t) == pytest.approx(expected, rel=1e-15)
 
 
 def test_bang_bang_rests_at_its_knots_and_is_half_way_and_fastest_at_mid_leg():
     ctx = context(40)
     for time, level in LEGS.knots:
-        assert (value(ctx, LEGS, time), value(ctx, LEGS, time, 1)) == (ctx.mpf(level), 0)
+        assert (LEGS.value(ctx, time), LEGS.value(ctx, time, 1)) == (ctx.mpf(level), 0)
     low, high = ctx.mpf(0.3), ctx.mpf(1.0)
-    assert value(ctx, LEGS, 0.125) == (low + high) / 2
-    assert value(ctx, LEGS, 0.125, 1) == 2 * (low - high) / ctx.mpf(0.25)
+    assert LEGS.value(ctx, 0.125) == (low + high) / 2
+    assert LEGS.value(ctx, 0.125, 1) == 2 * (low - high) / ctx.mpf(0.25)
     # Constant acceleration to mid-leg, the opposite after.
-    assert value(ctx, LEGS, 0.0625, 2) == -value(ctx, LEGS, 0.1875, 2)
+    assert LEGS.value(ctx, 0.0625, 2) == -LEGS.value(ctx, 0.1875, 2)
     # A quarter of the way in time is an eighth of the way in value.
-    assert value(ctx, LEGS, 0.0625) == high + (low - high) / 8
+    assert LEGS.value(ctx, 0.0625) == high + (low - high) / 8
 
 
 @given(moving, st.lists(times, min_size=1, max_size=5))
 def test_many_times_at_once_are_as_right_as_they_are_rounded(law, given_times):
-    ctx, limits = context(40), bounds(law)
+    ctx, limits = context(40), law.bounds()
     sizes = max(abs(limits.lowest), abs(limits.highest)), limits.slope, limits.curvature
     for order in (0, 1):
-        found = values(law, np.array(given_times), order)
-        far = 2 * max((abs(float(t)) for t in breakpoints(law)), default=0.0)
+        found = law.values(np.array(given_times), order)
+        far = 2 * max((abs(float(t)) for t in law.breakpoints()), default=0.0)
         for t, number in zip(given_times, found, strict=True):
             late = 4 * np.spacing(abs(t) + far)
-            assert abs(number - value(ctx, law, t, order)) <= 1e-14 * sizes[order] + late * sizes[order + 1]
+            assert abs(number - law.value(ctx, t, order)) <= 1e-14 * sizes[order] + late * sizes[order + 1]
 
 
 def test_many_times_at_once_know_their_legs():
     inside = np.array([t + turns for t in (0.0625, 0.1875, 0.3, 0.5625, 0.6875, 0.8) for turns in (-3, 0, 7)])
     for order in (0, 1, 2):
-        expected = [value(fp, LEGS, float(t), order) for t in inside]
-        assert values(LEGS, inside, order) == pytest.approx(expected, abs=1e-13)
-    assert values(LEGS, np.array([0.25, 1.25]), 2).tolist() == [0.0, 0.0]  # of the leg that follows
+        expected = [LEGS.value(fp, float(t), order) for t in inside]
+        assert LEGS.values(inside, order) == pytest.approx(expected, abs=1e-13)
+    assert LEGS.values(np.array([0.25, 1.25]), 2).tolist() == [0.0, 0.0]  # of the leg that follows
     # The phase of a far time is lost, but it is one; a leg's middle may round onto its knot.
     law = BangBang(knots=((0.0, 1.0), (0.1, 0.5), (0.3, 1.0)))
-    far = values(law, np.logspace(10, 20, 200))
+    far = law.values(np.logspace(10, 20, 200))
     assert (far.min() >= 0.5, far.max() <= 1.0) == (True, True)
     steep = BangBang(knots=((1.0, 1.0), (1.0 + 2.0**-52, 4.0), (2.0, 1.0)))
-    assert values(steep, np.array([1.0, 1.0 + 2.0**-52])).tolist() == [1.0, 4.0]
+    assert steep.values(np.array([1.0, 1.0 + 2.0**-52])).tolist() == [1.0, 4.0]
 
 
 def test_a_knot_belongs_to_the_leg_that_follows():
     law = BangBang(knots=((0.0, 1.0), (1.0, 2.0), (3.0, 1.0)))
-    assert value(fp, law, 1.0, 2) == -1.0
-    assert value(fp, law, 3.0, 2) == value(fp, law, 0.0, 2) == 4.0
+    assert law.value(fp, 1.0, 2) == -1.0
+    assert law.value(fp, 3.0, 2) == law.value(fp, 0.0, 2) == 4.0
     # And mid-leg to the half that brakes: a piece never ends where it starts to hold.
-    assert value(fp, law, 0.5, 2) == -4.0
-    assert all(piece_at(law, t).end > t for t in breakpoints(law))
+    assert law.value(fp, 0.5, 2) == -4.0
+    assert all(law.piece_at(t).end > t for t in law.breakpoints())
 
 
 @pytest.mark.parametrize("turns", [-(2**40), -3, -1, 1, 7, 2**40])
@@ -106,7 +94,7 @@ def test_bang_bang_repeats_at_negative_and_large_times(turns):
         late = Fraction(time) + turns
         ctx = context(60)
         for order in (0, 1, 2):
-            assert value(ctx, LEGS, exact(ctx, late), order) == value(ctx, LEGS, time, order)
+            assert LEGS.value(ctx, exact(ctx, late), order) == LEGS.value(ctx, time, order)
 
 
 @pytest.mark.parametrize("leg", [1e-20, 1e-160, 1e-310, 5e-324])
@@ -114,44 +102,44 @@ def test_floats_hold_the_values_of_legs_whose_parts_they_do_not(leg):
     law, ctx = BangBang(((0.0, 1.0), (leg, 0.5), (1.0, 1.0))), context(700)
     times = [0.0, 0.3 * leg, 0.7 * leg, leg, 0.25, 0.7]
     for order in (0, 1, 2):
-        right = [float(value(ctx, law, time, order)) for time in times]
-        assert [value(fp, law, time, order) for time in times] == pytest.approx(right, rel=1e-15, abs=1e-15)
-        assert value(fp, law, np.array(times), order) == pytest.approx(right, rel=1e-15, abs=1e-15)
+        right = [float(law.value(ctx, time, order)) for time in times]
+        assert [law.value(fp, time, order) for time in times] == pytest.approx(right, rel=1e-15, abs=1e-15)
+        assert law.value(fp, np.array(times), order) == pytest.approx(right, rel=1e-15, abs=1e-15)
 
 
 def test_times_may_be_any_kind_of_number():
     ctx = context(50)
     third = ctx.mpf(1) / 3
-    assert value(ctx, LEGS, third) == ctx.mpf(0.3)
-    assert value(ctx, LEGS, ctx.mpf(0.125)) == value(ctx, LEGS, 0.125) == value(ctx, LEGS, Fraction(1, 8))
+    assert LEGS.value(ctx, third) == ctx.mpf(0.3)
+    assert LEGS.value(ctx, ctx.mpf(0.125)) == LEGS.value(ctx, 0.125) == LEGS.value(ctx, Fraction(1, 8))
 
 
-@given(laws(), times)
+@given(drawn, times)
 def test_derivatives_are_limits_of_differences(law, t):
     ctx = context(60)
     time, step = ctx.mpf(t), ctx.mpf(2) ** -80
     # One-sided, for at a knot or mid-leg the law that follows holds; no knot may come within the step.
-    piece = piece_at(law, Fraction(t))
-    assume(not isinstance(piece, Quadratic) or piece.end > Fraction(t) + Fraction(1, 2**80))
+    piece = law.piece_at(Fraction(t))
+    assume(piece.end is None or piece.end > Fraction(t) + Fraction(1, 2**80))
     for order in (0, 1):
-        slope = (value(ctx, law, time + step, order) - value(ctx, law, time, order)) / step
-        size = 1 + abs(bounds(law).curvature) * (
-            1 + 64 * (float(frequency(fp, law)) if isinstance(law, Fourier) else 0.0)
+        slope = (law.value(ctx, time + step, order) - law.value(ctx, time, order)) / step
+        size = 1 + abs(law.bounds().curvature) * (
+            1 + 64 * (float(law.cycle.frequency(fp)) if law.is_trigonometric and law.cycle else 0.0)
         )
-        assert abs(slope - value(ctx, law, time, order + 1)) <= size * step
+        assert abs(slope - law.value(ctx, time, order + 1)) <= size * step
 
 
-@given(laws(), st.floats(-8.0, 8.0), st.floats(0.0, 2.0**-6))
+@given(drawn, st.floats(-8.0, 8.0), st.floats(0.0, 2.0**-6))
 def test_intervals_enclose_points(law, t, width):
     iv = MPIntervalContext()
     iv.prec = 80
     sharp = context(60)
-    piece = piece_at(law, Fraction(t))
-    stop = min(t + width, float(piece.end)) if isinstance(piece, Quadratic) else t + width
+    piece = law.piece_at(Fraction(t))
+    stop = t + width if piece.end is None else min(t + width, float(piece.end))
     for order in (0, 1, 2):
-        enclosure = evaluate(iv, piece, iv.mpf([t, stop]), order)
+        enclosure = piece.evaluate(iv, iv.mpf([t, stop]), order)
         for point in (t, (t + stop) / 2, stop):
-            assert evaluate(sharp, piece, sharp.mpf(point), order) in enclosure
+            assert piece.evaluate(sharp, sharp.mpf(point), order) in enclosure
 
 
 @pytest.mark.parametrize(
@@ -216,7 +204,7 @@ def test_numbers_of_any_kind_become_floats_and_lists_tuples(given, expected):
 def test_a_law_is_evaluated_at_a_time_or_an_array_of_times(law, period):
     grid = np.array([[0.0, 0.1], [2.5, -7.0]])
     assert law(grid).tolist() == law(grid.tolist()).tolist() == [[law(t) for t in row] for row in grid]
-    assert law(0.1) == pytest.approx(value(fp, law, 0.1), rel=1e-15)
+    assert law(0.1) == pytest.approx(law.value(fp, 0.1), rel=1e-15)
     table = Cap(r=law)
     assert table.at(0.1) == {"r": law(0.1)}
     assert table.period == period
@@ -304,8 +292,8 @@ def is_sharp(found: Bounds, true: list[tuple[mpf, mpf]]) -> bool:
 
 
 def rounded_up_by_a_factor(size: float, exponent: int) -> float:
-    """A faulty `scene.laws._up`: only a factor of 1 + 2^-45, which does nothing to a subnormal number."""
-    found = _up(size, exponent)
+    """A faulty `round_up`: only a factor of 1 + 2^-45, which does nothing to a subnormal number."""
+    found = round_up(size, exponent)
     return math.nextafter(found, 0.0) if found < LEAST_NORMAL else found
 
 
@@ -315,14 +303,14 @@ def test_bounds_are_rounded_outward_at_every_scale(seed, monkeypatch):
     n_subnormal = n_infinite = n_missed = 0
     for _ in range(N_LAWS // 4):
         law = extreme_law(draw)
-        found, true = bounds(law), truth(law)
+        found, true = law.bounds(), truth(law)
         assert is_sound(found, true), law
         assert is_sharp(found, true), law
         n_subnormal += any(0 < abs(bound) < LEAST_NORMAL for bound in found)
         n_infinite += math.inf in found
         with monkeypatch.context() as patch:
-            patch.setattr(scene.laws, "_up", rounded_up_by_a_factor)
-            n_missed += not is_sound(bounds(law), true)
+            patch.setattr(bounds, "round_up", rounded_up_by_a_factor)
+            n_missed += not is_sound(law.bounds(), true)
     assert n_subnormal > 100
     assert n_infinite > 50
     assert n_missed > 20  # the faulty one is caught
@@ -343,12 +331,12 @@ def test_bounds_are_rounded_outward_at_every_scale(seed, monkeypatch):
     ],
 )
 def test_bounds_of_the_most_extreme_laws(law):
-    assert is_sound(bounds(law), truth(law))
+    assert is_sound(law.bounds(), truth(law))
 
 
 def test_a_law_that_stands_still_has_exact_bounds():
-    assert bounds(0.3) == bounds(Fourier(0.3, 1.0)) == Bounds(0.3, 0.3, 0.0, 0.0)
-    assert bounds(BangBang(((0.0, 0.3), (1.0, 0.3)))) == Bounds(0.3, 0.3, 0.0, 0.0)
+    assert Constant(0.3).bounds() == Fourier(0.3, 1.0).bounds() == Bounds(0.3, 0.3, 0.0, 0.0)
+    assert BangBang(((0.0, 0.3), (1.0, 0.3))).bounds() == Bounds(0.3, 0.3, 0.0, 0.0)
 
 
 rationals = st.fractions(-4, 4, max_denominator=16)

@@ -4,6 +4,8 @@ Nobody can hold an invalid scene, and every entry of `scene` refuses bad input i
 """
 
 import copy
+import functools
+import inspect
 import json
 import math
 import os
@@ -25,9 +27,11 @@ from scene import (
     BangBang,
     Cap,
     Collision,
+    Constant,
     Fourier,
     Horizon,
     InvalidScene,
+    Law,
     Mushroom,
     Rejected,
     Scene,
@@ -165,7 +169,39 @@ def test_nothing_that_is_made_is_changed(made):
         with pytest.raises(AttributeError):
             delattr(made, field)
     assert repr(made) == before
-    assert not hasattr(made, "__dict__")
+    found = set(getattr(made, "__dict__", {}))
+    assert {name for name in found if not is_found_once(type(made), name)} == set()
+
+
+def is_found_once(kind, name):
+    return isinstance(inspect.getattr_static(kind, name, None), functools.cached_property)
+
+
+def test_what_is_found_once_is_no_part_of_a_scene():
+    """Laws and half-width are kept beside the fields: nothing copies, compares or writes them."""
+    found = Mushroom(r=Fourier(1.0, 1.0, (0.25,)), nu=0.5, h=1.0)
+    fresh = Mushroom(r=Fourier(1.0, 1.0, (0.25,)), nu=0.5, h=1.0)
+    before = hash(found), repr(found), to_data(found)
+    assert (found.laws["nu"], found.width.is_constant) == (Constant(0.5), False)
+    assert (hash(found), repr(found), to_data(found)) == before
+    assert found == fresh
+    assert vars(fresh) == {}
+    with pytest.raises(TypeError):
+        found.laws["nu"] = Constant(0.25)
+    for other in (copy.copy(found), copy.deepcopy(found), pickle.loads(pickle.dumps(found))):
+        assert vars(other) == {}
+        assert other == found
+    changed = msgspec.structs.replace(found, nu=0.25)
+    assert changed.laws["nu"] == Constant(0.25)
+    with pytest.raises(InvalidScene, match="unknown field `laws`"):
+        from_data({**to_data(found), "laws": {}})
+
+
+def test_a_constant_law_is_a_bare_number_in_a_table():
+    assert Cap(r=Constant(2)) == Cap(r=2.0)
+    assert repr(Cap(r=Constant(2))) == repr(Cap(r=2.0))
+    assert "r = nan, must be finite" in one_line(Cap, r=Constant(math.nan))
+    assert "r = an object of type Law, must be a number" in one_line(Cap, r=Law())
 
 
 def test_a_subclass_that_leaves_the_proof_out_is_no_scene():

@@ -18,6 +18,7 @@ from conformance.strategies import laws, scenes
 from scene import (
     BangBang,
     Cap,
+    Constant,
     Fourier,
     InvalidScene,
     Mushroom,
@@ -31,8 +32,9 @@ from scene import (
 )
 from scene.exact import leg_intervals
 from scene.geometry import area, rounded, table_at
-from scene.laws import bounds, breakpoints, exact, shared_period, value, values
+from scene.laws import bounds, breakpoints, shared_period, value, values
 from scene.mouth import mouth_minima
+from scene.pieces import exact
 from scene.tables import laws as laws_of, period
 from scene.validity import sign_on_legs
 
@@ -274,7 +276,7 @@ def test_conditions_are_enclosed():
         wave, legs = random_laws(draw)
         a, b = draw.choice(leg_intervals([legs]))
         m, h = (a + b) / 2, (b - a) / 2 / draw.choice((1, 4, 1024))
-        at_m, over = validity.enclose([(1, (wave, legs)), (-1, (0.5,))], m, h)
+        at_m, over = validity.enclose([(1, (wave, legs)), (-1, (Constant(0.5),))], m, h)
         assert at_m.delta < 1e-30
         for t in (m, *(m + h * Fraction(draw.randint(-1000, 1000), 1001) for _ in range(8))):
             assert over.a < exactly(wave, t) * exactly(legs, t) - 0.5 < over.b
@@ -308,7 +310,7 @@ def test_a_contact_is_refused_in_words():
 
 def test_a_lost_slope_is_caught(monkeypatch):
     """At the top of a wave it is level: the mutant holds the wave to be as high all along."""
-    terms = ((1, (Fourier(1.0, cos=(0.25,), period=1.0),)), (-1, (1.0,)))
+    terms = ((1, (Fourier(1.0, cos=(0.25,), period=1.0),)), (-1, (Constant(1.0),)))
     interval, honest = [(Fraction(-2, 5), Fraction(2, 5))], validity.enclose
     assert sign_on_legs(terms, False, interval).holds is False
     monkeypatch.setattr(validity, "enclose", lambda terms, m, h: (honest(terms, m, h)[0],) * 2)

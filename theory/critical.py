@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 
 from scene import exact
 from scene.exact import half_angle, leg_intervals, leg_polynomial
-from scene.laws import BangBang, Law, exact as number, is_constant
+from scene.laws import BangBang, Law, is_constant
 from scene.mouth import mouth_factors
+from scene.pieces import exact as number
 from scene.tables import Mushroom, laws, period
 from theory.volumes import NotCovered
 

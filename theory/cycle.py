@@ -27,8 +27,9 @@ from typing import Any, NamedTuple
 
 from mpmath import fp
 
-from scene.laws import Fourier, Piece, Quadratic, exact, frequency, piece_at
+from scene.laws import piece_at
 from scene.mouth import mouth_factors
+from scene.pieces import Piece, PolynomialPiece, TrigonometricPiece, exact
 from scene.precision import Decimals
 from scene.refusal import BadInput, check_count
 from scene.tables import Mushroom, Scene, laws, period
@@ -418,10 +419,10 @@ class MovingMushroom:
 
 def _turning(system: Any, pieces: Iterable[Piece]) -> Callable[[Any], Any]:
     """Return exp(i omega t) as a function of t; laws that move share one omega."""
-    waves = [piece for piece in pieces if isinstance(piece, Fourier)]
-    if not waves:
+    cycles = [piece.cycle for piece in pieces if not piece.is_polynomial]
+    if not cycles:
         return lambda t: None
-    omega = frequency(system, waves[0])
+    omega = cycles[0].frequency(system)
     return lambda t: system.expj(omega * t)
 
 
@@ -439,25 +440,34 @@ def _mouth(system: Any, pieces: tuple[Piece, Piece]) -> Motion:
 
 
 def _parameter(system: Any, piece: Piece) -> Parameter:
-    if isinstance(piece, Quadratic):
-        origin, c0, c2 = (exact(system, number) for number in piece[:3])
-        twice = 2 * c2
-
-        def value(t: Any, _: Any) -> Any:
-            x = t - origin
-            return c0 + x * (x * c2)
-
-        return Parameter(value, lambda t, _: (t - origin) * twice)
-    if isinstance(piece, Fourier):
+    if not piece.is_polynomial:
         return _wave(system, piece)
-    constant, zero = system.mpf(piece), system.zero
+    if piece.end is not None:
+        return _polynomial(system, piece)
+    constant, zero = system.mpf(piece.level), system.zero
     return Parameter(lambda t, turn: constant, lambda t, turn: zero)
 
 
-def _wave(system: Any, law: Fourier) -> Parameter:
-    """Sum a wave by Horner's scheme in complex numbers."""
-    omega, zero = frequency(system, law), system.mpc(0.0, 0.0)
-    amplitudes = {k: system.mpc(c, -s) for k, c, s in law.harmonics()}
+def _polynomial(system: Any, piece: PolynomialPiece) -> Parameter:
+    """Sum a polynomial of time by Horner's scheme."""
+    origin = exact(system, piece.origin)
+    coefficients = [exact(system, number) for number in piece.coefficients]
+    slopes = [k * c for k, c in enumerate(coefficients)][1:]
+
+    def total(terms: list[Any], t: Any) -> Any:
+        x = t - origin
+        found = terms[-1]
+        for a in terms[-2::-1]:
+            found = a + x * found
+        return found
+
+    return Parameter(lambda t, _: total(coefficients, t), lambda t, _: total(slopes, t))
+
+
+def _wave(system: Any, law: TrigonometricPiece) -> Parameter:
+    """Sum waves by Horner's scheme in complex numbers."""
+    omega, zero = law.cycle.frequency(system), system.mpc(0.0, 0.0)
+    amplitudes = {k: system.mpc(c, -s) for k, c, s in law.harmonics}
     terms = [amplitudes.get(k, zero) for k in range(max(amplitudes), 0, -1)]
     slopes = [k * amplitudes.get(k, zero) for k in range(max(amplitudes), 0, -1)]
 

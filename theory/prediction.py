@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from scene.laws import Law
+from scene.laws import GivenLaw
 from scene.notebook import rows
 from scene.precision import reduce_record
 from scene.refusal import BadInput, check_count, check_number, shown
@@ -255,6 +255,6 @@ def resolutions(
 
 
 @lru_cache(maxsize=KEPT)
-def _place(given: tuple[tuple[str, Law], ...], digits: int) -> list[Captures]:
+def _place(given: tuple[tuple[str, GivenLaw], ...], digits: int) -> list[Captures]:
     """Return the place of the solutions of a cycle: a list, empty at first."""
     return []

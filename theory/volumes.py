@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpmath import fp
 
-from scene.laws import Law, value
+from scene.laws import GivenLaw, value
 from scene.precision import reduce_record
 from scene.refusal import BadInput, check_number, shown
 from scene.tables import Mushroom, Scene, check_scene
@@ -149,7 +149,7 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
     if ctx is np:
         t = np.asarray(t)
 
-    def at(law: Law) -> Any:
+    def at(law: GivenLaw) -> Any:
         return value(ctx, law, t)
 
     r, h, slope = at(mushroom.r), at(mushroom.h), at(mushroom.slope)

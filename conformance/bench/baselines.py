@@ -37,6 +37,7 @@ from scene import (
     BangBang,
     Cap,
     Collision,
+    Constant,
     Fourier,
     Horizon,
     Law,
@@ -49,10 +50,8 @@ from scene import (
     Wall,
 )
 from scene.geometry import rounded, table_at
-from scene.laws import frequency
 from scene.protocol.wire import serve
 from scene.states import Stepper
-from scene.tables import laws, width_factors
 
 FloatArray = npt.NDArray[np.float64]
 SOURCE = Path(__file__).parent / "baselines.c"
@@ -172,14 +171,14 @@ def _outcome(row: list[float]) -> SolverAnswer:
 
 def questions(scene: Scene, states: Sequence[State]) -> Questions:
     """Return a scene and states as the engines take them."""
-    known = laws(scene)
-    width = (0.0,) if isinstance(scene, Cap) else width_factors(scene)
-    rows = [known.get("r", 0.0), width[0], width[1] if len(width) > 1 else 1.0]
-    rows += [known.get("h", 0.0), known.get("slope", 0.0)]
+    width = (*scene.width.factors, Constant(1.0))[:2]
+    r, h, slope = (scene.laws.get(name, Constant(0.0)) for name in ("r", "h", "slope"))
     table = CAP if isinstance(scene, Cap) else STEM if isinstance(scene, Stem) else MUSHROOM
     starts = [(s.t, s.x, s.y, s.vx, s.vy, WALLS.index(s.wall) if s.wall else NONE) for s in states]
     length = float(rounded(scene, states[0].t).size)
-    return Questions(table, np.array([_row(law) for law in rows]), length, np.array(starts, dtype=float))
+    return Questions(
+        table, np.array([_row(law) for law in (r, *width, h, slope)]), length, np.array(starts, dtype=float)
+    )
 
 
 def _row(law: Law) -> FloatArray:
@@ -187,10 +186,10 @@ def _row(law: Law) -> FloatArray:
     if isinstance(law, BangBang):
         row[0], pairs = BANG_BANG, list(law.knots)
     elif isinstance(law, Fourier):
-        row[0], row[2], row[3] = FOURIER, law.mean, float(frequency(fp, law))
+        row[0], row[2], row[3] = FOURIER, law.mean, float(law.frequency(fp))
         pairs = list(zip_longest(law.cos, law.sin, fillvalue=0.0))
     else:
-        row[0], row[2] = CONSTANT, law
+        row[0], row[2] = CONSTANT, law.level
     row[1] = len(pairs)
     row[PAIRS : PAIRS + 2 * len(pairs)] = np.ravel(pairs)
     return row

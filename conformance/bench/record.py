@@ -149,6 +149,7 @@ def this_machine(compiled: dict[str, str]) -> Machine:
 
 
 def _processor() -> str:
+    # Neither Python nor psutil knows the name of the processor on Linux.
     try:
         lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
     except OSError:

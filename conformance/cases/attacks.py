@@ -1,7 +1,8 @@
-"""Run families of attacks: the reference answers, the verifier judges its claim, others are held to it.
+"""Run families of attacks: the reference answers, the verifier and others are compared with it.
 
-The other steppers are callables that the caller gives. One answers a step in the wire's form, another a flow
-with the walls it counted. `undecided` is honest. Steps are compared by `conformance.grading.agreement`.
+The other steppers are callables that the caller gives. One answers a step in the wire's form,
+another a flow with the walls it counted. `undecided` is honest. Steps are compared by
+`conformance.grading.agreement`.
 """
 
 import json
@@ -30,7 +31,8 @@ class Judgement(NamedTuple):
     """How one answer compares.
 
     Attributes:
-        kind: agreed, undecided, refused, open (the verifier does not prove what is claimed), or wrong.
+        kind: agreed, undecided, refused, open (the verifier does not prove what is claimed), or
+            wrong.
         why: one line.
         ulps: worst backward ulps of a component, of a step in binary64.
         claim: what the reference claims, where that is proved.
@@ -106,8 +108,15 @@ def run(
 
 
 def line(attack: Question, seed: int, index: int) -> str:
-    """Write a question as one line of JSON: where it comes from, and the question in the wire's form."""
-    path = {} if attack.collisions is None else {"collisions": attack.collisions, "working": attack.working}
+    """Write a question as one line of JSON.
+
+    It has where the question comes from, and the question in the wire's form.
+    """
+    path = (
+        {}
+        if attack.collisions is None
+        else {"collisions": attack.collisions, "working": attack.working}
+    )
     named = {"family": attack.group, "seed": seed, "index": index, "scene": attack.wire_scene()}
     asked = {"state": msgspec.structs.asdict(attack.state), "t_end": attack.t_end}
     return json.dumps({**named, "cmd": "trajectory" if path else "step", **asked, **path})
@@ -121,7 +130,8 @@ def judged(attack: Question, steppers: UnderAttack) -> Iterable[Judgement]:
     if is_proved or found.kind == "wrong":
         yield found
     if step is not None:
-        is_alone, alone = attack.collisions is None, attack._replace(collisions=None, is_flow=False)
+        is_alone = attack.collisions is None
+        alone = attack._replace(collisions=None, is_flow=False)
         claim = (found if is_alone else _survived(partial(confirmed, alone))).claim
         yield _survived(lambda: stepped(step(*asked), claim, attack.state))
     if flow is not None and attack.is_flow:
@@ -129,7 +139,10 @@ def judged(attack: Question, steppers: UnderAttack) -> Iterable[Judgement]:
 
 
 def _survived(judge_answer: Callable[[], Judgement]) -> Judgement:
-    """Return a verdict; whatever a stepper under attack raises is one too, and the search goes on."""
+    """Return a verdict.
+
+    Whatever a stepper under attack raises is one too, and the search goes on.
+    """
     try:
         return judge_answer()
     except Exception as error:
@@ -137,8 +150,13 @@ def _survived(judge_answer: Callable[[], Judgement]) -> Judgement:
 
 
 def confirmed(attack: Question) -> Judgement:
-    """Ask the reference, and have the verifier judge its claim; of an undecided path as far as that goes."""
-    state, t_end, n_collisions = attack.state, attack.t_end, attack.collisions
+    """Ask the reference, and have the verifier judge its claim.
+
+    Of an undecided path as far as that goes.
+    """
+    state = attack.state
+    t_end = attack.t_end
+    n_collisions = attack.collisions
     scene = from_data(attack.wire_scene())
     begun = time.process_time()
     if n_collisions is None:
@@ -146,23 +164,33 @@ def confirmed(attack: Question) -> Judgement:
     else:
         claim = claimed_path(scene, state, n_collisions, t_end, attack.working)
     seconds = (time.process_time() - begun) / max(len(claim.steps), 1)
-    is_undecided, n_steps = claim.outcome == "undecided", len(claim.steps) + (claim.outcome == "undefined")
+    is_undecided = claim.outcome == "undecided"
+    n_steps = len(claim.steps) + (claim.outcome == "undefined")
     if is_undecided and not claim.steps:
         return Judgement("undecided", claim.reason, seconds=seconds)
     written = Expectation("collision", claim.steps) if is_undecided else claim
     proved = Proved(with_further(written, scene, state), collisions=max(n_steps, 1))
-    verdict = judge(file_vector(attack._replace(group="attack", is_flow=False), 1, proved, "stress"))
+    verdict = judge(
+        file_vector(attack._replace(group="attack", is_flow=False), 1, proved, "stress")
+    )
     if verdict.status == "false":
-        return Judgement("wrong", f"the reference claims what is false: {verdict.reason}", seconds=seconds)
+        return Judgement(
+            "wrong", f"the reference claims what is false: {verdict.reason}", seconds=seconds
+        )
     if is_undecided:
         return Judgement("undecided", claim.reason, seconds=seconds)
     if verdict.status != "proved":
         return Judgement("open", verdict.reason, seconds=seconds)
-    return Judgement("refused" if claim.outcome == "rejected" else "agreed", claim=claim, seconds=seconds)
+    return Judgement(
+        "refused" if claim.outcome == "rejected" else "agreed", claim=claim, seconds=seconds
+    )
 
 
 def stepped(outcome: Outcome, claim: Expectation | None, state: State) -> Judgement:
-    """Judge one step in binary64: the same outcome within some backward ulps, or an honest undecided."""
+    """Judge one step in binary64.
+
+    Right is the same outcome within some backward ulps, or an honest undecided.
+    """
     if isinstance(outcome, Rejected) and claim is not None:
         return Judgement("refused")
     found = compare(outcome, claim, state, SHARP)
@@ -179,4 +207,6 @@ def flown(counts: dict[str, int] | None, claim: Expectation | None) -> Judgement
         return Judgement("open", "no path to the horizon is proved")
     truth = Counter(step.wall for step in claim.steps if step.wall)
     is_right = Counter(counts) == truth
-    return Judgement("agreed" if is_right else "wrong", f"a flow met {counts}, must be {dict(truth)}")
+    return Judgement(
+        "agreed" if is_right else "wrong", f"a flow met {counts}, must be {dict(truth)}"
+    )

@@ -1,18 +1,19 @@
-"""From a question to a certified vector: the reference answers, and the verifier proves what is written.
+"""From a question to a certified vector: the reference answers, the verifier proves the line.
 
-Answers of single steps come first, the one place that makes them from the reference's enclosures. At a knot
-of a law the acceleration of a wall jumps, and the derivatives with it. Rounding may put a hit on either side:
-the larger sum of both sides counts.
+Answers of single steps come first, the one place that makes them from the reference's enclosures.
+At a knot of a law the acceleration of a wall jumps, and the derivatives with it. Rounding may put a
+hit on either side: the larger sum of both sides counts.
 
-Along a path the Jacobians of the steps are chained: what rounding every state that a stepper holds may do.
+Along a path the Jacobians of the steps are chained: what rounding every state that a stepper holds
+may do.
 
-An arc hit of a mushroom is captured when |x vy - y vx| > w(t) |v|, with the time and place of the hit and
-the velocity before the bounce (docs/protocol.md). Which hits begin and end a stay follows from two things
-alone: the order of the walls met, and for each arc hit whether it is captured. The reference's path proves
-the first; the signs of (x vy - y vx)^2 - w^2 v^2, certain over the enclosures of each hit, are the second:
-neither side of the inequality is negative, so squares compare as they do. A hit whose sign is open makes
-the question unfit. So all states within the enclosures have their stays between the same hits, and when
-these happen is enclosed with the path.
+An arc hit of a mushroom is captured when |x vy - y vx| > w(t) |v|, with the time and place of the
+hit and the velocity before the bounce (docs/protocol.md). Which hits begin and end a stay follows
+from two things alone: the order of the walls met, and for each arc hit whether it is captured. The
+reference's path proves the first; the signs of (x vy - y vx)^2 - w^2 v^2, certain over the
+enclosures of each hit, are the second: neither side of the inequality is negative, so squares
+compare as they do. A hit whose sign is open makes the question unfit. So all states within the
+enclosures have their stays between the same hits, and when these happen is enclosed with the path.
 """
 
 import json
@@ -43,6 +44,7 @@ from conformance.vectors import (
 )
 from conformance.verify import Verdict, verify_line
 from reference.arithmetic import Arithmetic, Interval, rational, sign
+from reference.prepared import prepare
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import (
     BadInput,
@@ -68,7 +70,9 @@ REFUSAL = Expectation("rejected")
 GUARD = 6  # decimals asked of the reference beyond those that are written down
 
 
-def proved_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS) -> Expectation | None:
+def proved_step(
+    scene: Scene, state: State, t_end: float, digits: int = DIGITS
+) -> Expectation | None:
     """Answer a step by proof.
 
     Args:
@@ -86,7 +90,9 @@ def proved_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS) 
 
 def measured_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS) -> Proved | None:
     """Return a step's certified answer as `proved_step` does, and how delicate it is."""
-    outcome = reference.next_collision(scene, state, t_end, digits=digits + GUARD, is_differentiated=True)
+    outcome = reference.next_collision(
+        scene, state, t_end, digits=digits + GUARD, is_differentiated=True
+    )
     links = Links(state)
     if isinstance(outcome, Undecided):
         return None
@@ -103,15 +109,19 @@ def measured_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS
 
 
 def _steepest(derivative: reference.Enclosure, largest: float) -> float:
-    """Return a derivative rounded; at a knot, where it is enclosed between two, the greater in size."""
-    low, high = float(derivative.lo), float(derivative.hi)
+    """Return a derivative rounded.
+
+    At a knot, where it is enclosed between two, the greater in size.
+    """
+    low = float(derivative.lo)
+    high = float(derivative.hi)
     if high - low <= 2.0**-40 * largest:
         return float(derivative)
     return max(low, high, key=abs)
 
 
 def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> State:
-    """Return a state whose numbers are moved by a part of their sizes, each in a direction of its own.
+    """Return a state with numbers moved by a part of their sizes, each in a direction of its own.
 
     Args:
         state: the start.
@@ -119,10 +129,13 @@ def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> St
         signs: of the moves of t, x, y, vx, vy.
         nudge: relative; to the greater component for place and velocity.
     """
-    place, speed = max(abs(state.x), abs(state.y)), max(abs(state.vx), abs(state.vy))
+    place = max(abs(state.x), abs(state.y))
+    speed = max(abs(state.vx), abs(state.vy))
     sizes = (abs(state.t), place, place, speed, speed)
     numbers = astuple(state)[:5]
-    t, x, y, vx, vy = (v + nudge * sign * size for v, sign, size in zip(numbers, signs, sizes, strict=True))
+    t, x, y, vx, vy = (
+        v + nudge * sign * size for v, sign, size in zip(numbers, signs, sizes, strict=True)
+    )
     return State(min(t, t_end), x, y, vx, vy, state.wall)
 
 
@@ -147,7 +160,10 @@ def _numbers(dt: Ends, after: reference.Moment) -> dict[str, Ends]:
 
 
 def free_flight(state: State, dt: float) -> Matrix:
-    """Return the (5, 5) Jacobian of a flight up to a fixed time: dt, x, y, vx, vy by t, x, y, vx, vy."""
+    """Return the (5, 5) Jacobian of a flight up to a fixed time.
+
+    Rows are dt, x, y, vx, vy, columns t, x, y, vx, vy.
+    """
     return [
         [-1.0, 0.0, 0.0, 0.0, 0.0],
         [-state.vx, 1.0, 0.0, dt, 0.0],
@@ -169,11 +185,14 @@ def condition_number(out: Sequence[float], allowance: Sequence[float]) -> float:
         largest components; inf when such a vector vanishes though it can move.
     """
     sizes = [abs(value) for value in out]
-    parts = [(max(allowance[part]), max(sizes[part])) for part in (slice(1), slice(1, 3), slice(3, 5))]
+    parts = [
+        (max(allowance[part]), max(sizes[part])) for part in (slice(1), slice(1, 3), slice(3, 5))
+    ]
     return max((change / size if size else (inf if change else 0.0)) for change, size in parts)
 
 
-# What a hit means for capture intervals: arc of a mushroom, captured or free; wall of the stem; nothing.
+# What a hit means for capture intervals: arc of a mushroom, captured or free; wall of the stem;
+# nothing.
 Mark = Literal["captured", "free", "out", ""]
 WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
 
@@ -181,15 +200,16 @@ WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backw
 class Links:
     """The steps of a trajectory: their Jacobians chained from each state that a stepper has held.
 
-    Each Jacobian is that of the step from the enclosed state, with the residual of the wall moving along.
-    `held` is (n, 5, 5): d(t, x, y, vx, vy) after the last step by t, x, y, vx, vy of each state held, and
-    `inputs` is (n, 5). Sums go over whole arrays: four digits of the allowances are kept, which no order of
-    summation changes. A flow tells no flight times: how delicate these are does not count where `is_timed`
-    is false.
+    Each Jacobian is that of the step from the enclosed state, with the residual of the wall moving
+    along. `held` is (n, 5, 5): d(t, x, y, vx, vy) after the last step by t, x, y, vx, vy of each
+    state held, and `inputs` is (n, 5). Sums go over whole arrays: four digits of the allowances are
+    kept, which no order of summation changes. A flow tells no flight times: how delicate these are
+    does not count where `is_timed` is false.
     """
 
     def __init__(self, state: State, *, is_timed: bool = True) -> None:
-        self.state, self.is_timed = state, is_timed
+        self.state = state
+        self.is_timed = is_timed
         self.held: npt.NDArray[np.float64] = np.empty((0, 5, 5))
         self.inputs: npt.NDArray[np.float64] = np.empty((0, 5))
         self.condition = self.largest = 0.0
@@ -217,7 +237,9 @@ class Links:
             rows[:, 0] += self.held[:, 0]
         self.held = rows
         allowance: list[float] = moved.tolist()
-        self.condition = condition_number(centre if self.is_timed else [inf, *centre[1:]], allowance)
+        self.condition = condition_number(
+            centre if self.is_timed else [inf, *centre[1:]], allowance
+        )
         return allowance
 
 
@@ -238,30 +260,20 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     Args:
         scene: table and laws, of the question.
         question: of a trajectory or a flow.
-        working: number of decimals to work with, by default what the reference takes. It answers for the
-            digits of the last collision asked for; a path that ends at a horizon may need more.
+        working: number of decimals to work with, by default what the reference takes. It answers
+            for the digits of the last collision asked for; a path that ends at a horizon may need
+            more.
 
     Raises:
         Unfit: there is no answer to certify.
     """
-    assert question.collisions is not None
-    state, t_end = question.state, question.t_end
-    try:
-        path = reference.trajectory(
-            scene, state, question.collisions, t_end, working=working, is_differentiated=True
-        )
-        marks = [mark(scene, step) for step in path.steps] if question.is_flow else []
-    except InvalidState as error:
-        raise Unfit(str(error)) from None
-    end = path.outcome
-    if question.is_flow and not isinstance(end, reference.Horizon):
-        raise Unfit("no flow to the horizon")
-    links = Links(state, is_timed=not question.is_flow)
+    path, marks = _followed(scene, question, working)
+    links = Links(question.state, is_timed=not question.is_flow)
     steps = _steps(scene, links, path, question)
-    if len(steps) < len(path.steps):
-        end = None
+    end = path.outcome if len(steps) == len(path.steps) else None
     if isinstance(end, reference.Horizon):
-        numbers = coasted(end, ends(path.steps[-1].after.t) if steps else (Fraction(state.t),) * 2)
+        begin = ends(path.steps[-1].after.t) if steps else (Fraction(question.state.t),) * 2
+        numbers = coasted(end, begin)
         steps.append(certified(numbers, finite(links.coast(numbers)), None, is_wide=True))
         links.largest = max(links.largest, links.condition)
     elif end is not None and not isinstance(end, Undefined):
@@ -269,19 +281,52 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     if any(map(_is_wide, steps)):
         return proved_path(scene, question, 2 * path.digits)
     if question.is_flow:
-        arrived = arrival(steps, capture_intervals(marks))
-        largest = max(links.condition, timing_condition(arrived, state))
-        if largest > question.longest:
-            raise Unfit("the horizon is too delicate")
-        return Proved((arrived,), largest, len(steps))
-    expect = [Expectation("horizon" if end else "collision", tuple(steps))]
+        return _proved_flow(question, links, steps, marks)
+    walked = tuple(steps)
     if isinstance(end, Undefined):
-        expect = [Expectation("undefined", tuple(steps), end.reason), Expectation("undecided", tuple(steps))]
-    return Proved(tuple(expect), links.largest, len(steps) + isinstance(end, Undefined))
+        expect = (Expectation("undefined", walked, end.reason), Expectation("undecided", walked))
+        return Proved(expect, links.largest, len(steps) + 1)
+    outcome: Literal["horizon", "collision"] = "horizon" if end else "collision"
+    return Proved((Expectation(outcome, walked),), links.largest, len(steps))
 
 
-def _steps(scene: Scene, links: Links, path: reference.Trajectory, question: Question) -> list[Certified]:
-    """Write down a path's collisions as far as condition number and rounding allow; of a flow all."""
+def _followed(
+    scene: Scene, question: Question, working: int | None
+) -> tuple[reference.Trajectory, list[Mark]]:
+    """Return the proved path of a question, and of a flow what each hit says of capture."""
+    assert question.collisions is not None
+    n = question.collisions
+    t_end = question.t_end
+    try:
+        path = reference.trajectory(
+            scene, question.state, n, t_end, working=working, is_differentiated=True
+        )
+        marks = [mark(scene, step) for step in path.steps] if question.is_flow else []
+    except InvalidState as error:
+        raise Unfit(str(error)) from None
+    if question.is_flow and not isinstance(path.outcome, reference.Horizon):
+        raise Unfit("no flow to the horizon")
+    return path, marks
+
+
+def _proved_flow(
+    question: Question, links: Links, steps: list[Certified], marks: list[Mark]
+) -> Proved:
+    """Return a flow's answer from the whole path to its horizon, or to where `_steps` gave up."""
+    arrived = arrival(steps, capture_intervals(marks))
+    largest = max(links.condition, timing_condition(arrived, question.state))
+    if largest > question.longest:
+        raise Unfit("the horizon is too delicate")
+    return Proved((arrived,), largest, len(steps))
+
+
+def _steps(
+    scene: Scene, links: Links, path: reference.Trajectory, question: Question
+) -> list[Certified]:
+    """Write down a path's collisions as far as condition number and rounding allow.
+
+    Of a flow all.
+    """
     steps: list[Certified] = []
     for found in path.steps:
         before = links.state
@@ -299,10 +344,11 @@ def _steps(scene: Scene, links: Links, path: reference.Trajectory, question: Que
 
 
 def _is_kept(scene: Scene, rounded: State, t_end: float, step: Certified) -> bool:
-    """Tell whether a step is much the same from the rounded state before it, which steppers in binary64 hold.
+    """Tell whether a step is much the same from the rounded state before it, as steppers round.
 
-    Derivatives do not see a wall that moves across the whole table between two times that are next to each
-    other in binary64. The plain stepper is quick; only where it misses the step the reference is asked.
+    Derivatives do not see a wall that moves across the whole table between two times that are next
+    to each other in binary64. The plain stepper is quick; only where it misses the step the
+    reference is asked.
     """
     expected = Expectation("collision", (step,))
     if compare(next_collision(scene, rounded, t_end), expected, rounded).verdict == "pass":
@@ -329,7 +375,8 @@ def claimed_path(
         path = reference.trajectory(scene, state, n_collisions, t_end, working=working)
     except InvalidState:
         return Expectation("rejected")
-    unknown, end = [0.0] * len(NUMBERS), path.outcome
+    unknown = [0.0] * len(NUMBERS)
+    end = path.outcome
     steps = [certified(collided(found), unknown, found.wall, is_wide=True) for found in path.steps]
     if isinstance(end, Undefined):
         return Expectation("undefined", tuple(steps), end.reason)
@@ -364,10 +411,11 @@ def mark(scene: Scene, step: reference.Collision) -> Mark:
 
 
 def capture_intervals(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
-    """Return begin and end of each stay as places in a path whose horizon comes after its last mark.
+    """Return begin and end of each stay as places in a path that ends at a horizon.
 
-    A stay begins with its first captured hit. It ends with the first arc hit after its last captured one, or
-    where the particle meets a wall of the stem if that comes first, or at the horizon.
+    A stay begins with its first captured hit. It ends with the first arc hit after its last
+    captured one, or where the particle meets a wall of the stem if that comes first, or at the
+    horizon.
     """
     spans: list[tuple[int, int]] = []
     interval = CaptureInterval()  # of places in the path, in place of times
@@ -375,7 +423,8 @@ def capture_intervals(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
         if mark in ("captured", "free"):
             interval = interval.after(place, mark == "captured")
         elif mark == "out":
-            if span := interval.until(place):
+            span = interval.until(place)
+            if span:
                 spans.append((int(span[0]), int(span[1])))
             interval = CaptureInterval()
     return tuple(spans)
@@ -384,13 +433,14 @@ def capture_intervals(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
 def arrival(steps: Sequence[Certified], spans: Sequence[tuple[int, int]]) -> Expectation:
     """Return a flow's answer: of its path the hits that begin or end a stay, and the horizon.
 
-    That is all that is asked. Each keeps its enclosures; dt is counted from the one kept before, and what
-    may move it is the sum over the flights between.
+    That is all that is asked. Each keeps its enclosures; dt is counted from the one kept before,
+    and what may move it is the sum over the flights between.
     """
     kept = sorted({place for span in spans for place in span} | {len(steps) - 1})
     thinned = []
     for before, place in zip([-1, *kept], kept, strict=False):
-        flown, last = steps[before + 1 : place + 1], steps[place]
+        flown = steps[before + 1 : place + 1]
+        last = steps[place]
         low, high = (sum(sides) for sides in zip(*(step.ends("dt") for step in flown), strict=True))
         numbers = {name: last.ends(name) for name in NUMBERS} | {"dt": (low, high)}
         allowance = [sum(step.allowance[0] for step in flown), *last.allowance[1:]]
@@ -400,24 +450,28 @@ def arrival(steps: Sequence[Certified], spans: Sequence[tuple[int, int]]) -> Exp
 
 
 def timing_condition(expected: Expectation, state: State) -> float:
-    """Return the condition number of the times at which a flow's stays begin and end, the largest."""
-    t, allowance, worst = state.t, abs(state.t), 0.0
+    """Return the largest condition number of the times at which a flow's stays begin and end."""
+    t = state.t
+    allowance = abs(state.t)
+    worst = 0.0
     for step in expected.steps[:-1]:
-        t, allowance = t + float(step.centre("dt")), allowance + step.allowance[0]
+        t = t + float(step.centre("dt"))
+        allowance = allowance + step.allowance[0]
         worst = max(worst, allowance / abs(t) if t else inf)
     return worst
 
 
 def _is_captured(scene: Mushroom, step: reference.Collision) -> bool:
     """Tell whether |x vy - y vx| > w |v|; the left side is the same all along the flight."""
-    arithmetic, departure = Arithmetic(step.digits), step.departure
+    arithmetic = Arithmetic(step.digits)
+    departure = step.departure
 
     def interval(enclosure: reference.Enclosure) -> Interval:
         return arithmetic.hull(*(arithmetic.point(raw.number(end)) for end in enclosure))
 
     x, y, vx, vy = (interval(getattr(departure, name)) for name in ("x", "y", "vx", "vy"))
     flight = EnclosedFlight(departure.instant, x, y, vx, vy, interval(departure.begin))
-    width = MovingWalls(arithmetic, scene, flight).width(interval(step.root)).f
+    width = MovingWalls(arithmetic, prepare(scene), flight).width(interval(step.root)).f
     spin = arithmetic.square(x * vy - y * vx)
     found = sign(spin - arithmetic.square(width) * (arithmetic.square(vx) + arithmetic.square(vy)))
     if not found:
@@ -454,7 +508,9 @@ def certify(question: Question, number: int) -> Vector:
         proved = _step(scene, question) if is_step else proved_path(scene, question)
     expect = with_further(proved.expect[0], scene, question.state, is_loose=is_loose)
     rounded = four_digits(min(proved.condition, INFINITE))
-    vector = file_vector(question, number, proved._replace(expect=expect, condition=rounded), "stress")
+    vector = file_vector(
+        question, number, proved._replace(expect=expect, condition=rounded), "stress"
+    )
     vector = msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
     verdict = judge(vector)
     if verdict.status != "proved":
@@ -466,9 +522,10 @@ def certify(question: Question, number: int) -> Vector:
 def with_further(
     known: Expectation, scene: Scene | None, state: State, *, is_loose: bool = False
 ) -> tuple[Expectation, ...]:
-    """Return a right answer with the further answers that the rules permit (`scene.protocol.rules`).
+    """Return a right answer, and what else the rules permit (`scene.protocol.rules`).
 
-    A refusal comes first for a scene with fields that may be ignored, because `scene.from_data` refuses it.
+    A refusal comes first for a scene with fields that may be ignored, because `scene.from_data`
+    refuses it.
 
     Args:
         known: the right answer.
@@ -517,10 +574,12 @@ def _level(scene: Scene | None, vector: Vector) -> Level:
 
 
 def _walls_met(scene: Scene, vector: Vector, state: State) -> list[str]:
-    """Return the walls that a state meets, which hits are captured where that is asked, and how it ends."""
+    """Return the walls that a state meets, which hits are captured if asked, and how it ends."""
     if vector.kind == "step":
         outcome = reference.next_collision(scene, state, vector.t_end, digits=15)
-        return [outcome.wall if isinstance(outcome, reference.Collision) else type(outcome).__name__]
+        return [
+            outcome.wall if isinstance(outcome, reference.Collision) else type(outcome).__name__
+        ]
     try:
         path = reference.trajectory(scene, state, vector.collisions, vector.t_end, digits=10)
         marks = [mark(scene, step) for step in path.steps] if vector.kind == "flow" else []

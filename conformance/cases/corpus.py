@@ -1,9 +1,9 @@
 """The corpus as it was published, and what is added to it; `python -m conformance.cases`.
 
-A published question stands in its line, and nowhere else; a new one is written by hand, or drawn by a
-family. All are answered by the reference and proved by the verifier. The command makes the corpus anew, adds
-to it, checks that it is what would be made, or packs it: some ten minutes on one core; `--jobs N` shares
-them out.
+A published question stands in its line, and nowhere else; a new one is written by hand, or drawn by
+a family. All are answered by the reference and proved by the verifier. The command makes the corpus
+anew, adds to it, checks that it is what would be made, or packs it: some ten minutes on one core;
+`--jobs N` shares them out.
 """
 
 import argparse
@@ -47,7 +47,10 @@ ROUNDING = 1e-30  # relative: the reference works with at least 30 digits
 
 
 def question_of(line: Vector) -> Question:
-    """Return what a published line asks: it takes the path as far as the line does, and keeps its level."""
+    """Return what a published line asks.
+
+    It takes the path as far as the line does, and keeps its level.
+    """
     return Question(
         line.scene,
         line.state,
@@ -87,8 +90,10 @@ def make(name: str) -> Vector:
 
 
 def errata() -> list[str]:
-    """Return the ids of published vectors that do not list the further answers that the rules permit."""
-    return [name for name, line in published().items() if verify_line(_plain(line)).status == "false"]
+    """Return the ids of published vectors that lack further answers which the rules permit."""
+    return [
+        name for name, line in published().items() if verify_line(_plain(line)).status == "false"
+    ]
 
 
 def _plain(line: Vector) -> Any:
@@ -96,27 +101,33 @@ def _plain(line: Vector) -> Any:
 
 
 def agrees(made: Vector, line: Vector) -> bool:
-    """Tell whether two answers to a question are the same, but for how closely their numbers are enclosed.
+    """Tell whether two answers are the same, but for how closely their numbers are enclosed.
 
-    That depends on the digits with which the reference works: on how far ahead it looks, and on its version.
-    What vanishes may be rounding: allowances are compared to a part ROUNDING of the size of their vectors.
+    That depends on the digits with which the reference works: on how far ahead it looks, and on its
+    version. What vanishes may be rounding: allowances are compared to a part ROUNDING of the size
+    of their vectors.
     """
     if _outline(made) != _outline(line):
         return False
     for one, other in zip(_steps(made), _steps(line), strict=True):
         slack = _slack(other)
         for name, a, b in zip(NUMBERS, one.allowance, other.allowance, strict=True):
-            (low, high), (least, most) = one.ends(name), other.ends(name)
+            low, high = one.ends(name)
+            least, most = other.ends(name)
             if low > most or least > high or not isclose(a, b, rel_tol=1e-2, abs_tol=slack[name]):
                 return False
     return True
 
 
 def _slack(step: Certified) -> dict[str, float]:
-    """Return what an allowance may differ by if it vanishes: a part of its time, place or velocity."""
+    """Return what an allowance that vanishes may differ by: a part of time, place or velocity."""
     sizes = dict(zip(NUMBERS, step.allowance, strict=True))
-    sizes = {name: max(size, *(abs(float(end)) for end in step.ends(name))) for name, size in sizes.items()}
-    place, velocity = max(sizes["x"], sizes["y"]), max(sizes["vx"], sizes["vy"])
+    sizes = {
+        name: max(size, *(abs(float(end)) for end in step.ends(name)))
+        for name, size in sizes.items()
+    }
+    place = max(sizes["x"], sizes["y"])
+    velocity = max(sizes["vx"], sizes["vy"])
     found = {"dt": sizes["dt"], "x": place, "y": place, "vx": velocity, "vy": velocity}
     return {name: ROUNDING * size for name, size in found.items()}
 
@@ -124,7 +135,10 @@ def _slack(step: Certified) -> dict[str, float]:
 def _outline(vector: Vector) -> list[Any]:
     """Return what is compared exactly."""
     answers = [(known, [step.wall for step in known.steps]) for known in vector.expect]
-    return [vector.level, *((known.outcome, known.reason, known.stays, walls) for known, walls in answers)]
+    return [
+        vector.level,
+        *((known.outcome, known.reason, known.stays, walls) for known, walls in answers),
+    ]
 
 
 def _steps(vector: Vector) -> list[Certified]:
@@ -135,17 +149,22 @@ def certify_added(path: Path) -> list[Vector]:
     """Certify new questions, which go to the ends of their groups.
 
     Args:
-        path: JSON lines. A family's question is given by `family`, `seed` and `index`, as `mushrooms attack`
-            names it. One that is written by hand has group, rule, source, scene, state and t_end; for a path
-            kind and collisions. Which further answers pass follows from the rules.
+        path: JSON lines. A family's question is given by `family`, `seed` and `index`, as
+            `mushrooms attack` names it. One that is written by hand has group, rule, source, scene,
+            state and t_end; for a path kind and collisions. Which further answers pass follows from
+            the rules.
     """
     found: list[Vector] = []
     for i, line in enumerate(path.read_bytes().splitlines(), 1):
         try:
             asked = _asked(msgspec.json.decode(line, type=dict[str, Any]))
         except (msgspec.MsgspecError, KeyError) as error:
-            raise BadInput(f"{path.name}:{i}: {error}, must be a question as CONTRIBUTING has it") from None
-        number = groups().get(asked.group, 0) + sum(vector.group == asked.group for vector in found) + 1
+            raise BadInput(
+                f"{path.name}:{i}: {error}, must be a question as CONTRIBUTING has it"
+            ) from None
+        number = (
+            groups().get(asked.group, 0) + sum(vector.group == asked.group for vector in found) + 1
+        )
         try:
             found.append(certify(asked, number))
         except Unfit as why:
@@ -163,9 +182,13 @@ def _asked(data: dict[str, Any]) -> Question:
 
 
 def write(folder: Path, vectors: Iterable[Vector]) -> Manifest:
-    """Write vectors, by file, and their manifest, each complete or not at all; the manifest last."""
+    """Write vectors, by file, and their manifest, each complete or not at all.
+
+    The manifest last.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    files, entries = defaultdict[str, list[Vector]](list), {}
+    files = defaultdict[str, list[Vector]](list)
+    entries = {}
     for vector in vectors:
         name = "hard-cases" if vector.group.startswith("hard-case-") else vector.group
         files[f"{name}.jsonl"].append(vector)
@@ -206,14 +229,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--out", type=Path, default=FOLDER, metavar="DIR", help="where it goes, or is checked"
     )
-    parser.add_argument("--check", action="store_true", help="make it, and compare with what is there")
+    parser.add_argument(
+        "--check", action="store_true", help="make it, and compare with what is there"
+    )
     parser.add_argument(
         "--add", type=Path, metavar="FILE", help="add the questions of a file, and make no other"
     )
     parser.add_argument(
-        "--errata", action="store_true", help="make those lines anew that the verifier holds to be false"
+        "--errata",
+        action="store_true",
+        help="make those lines anew that the verifier holds to be false",
     )
-    parser.add_argument("--archive", type=Path, metavar="FILE", help="write the corpus and verify.py as .zip")
+    parser.add_argument(
+        "--archive", type=Path, metavar="FILE", help="write the corpus and verify.py as .zip"
+    )
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")
     options = parser.parse_args(arguments)
     if options.jobs < 1:
@@ -233,7 +262,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _wanted(options: argparse.Namespace) -> list[Vector]:
-    """Return the corpus that the options ask for: with lines added, with lines mended, or all made anew."""
+    """Return the corpus that the options ask for: lines added, lines mended, or all made anew."""
     if options.add:
         return [*published().values(), *certify_added(options.add)]
     if options.errata:

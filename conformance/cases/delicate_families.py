@@ -1,10 +1,10 @@
-"""Families at ties: on corners and knots, at the horizon, at residuals, beside laws that all but vanish.
+"""Families at ties: corners, knots, the horizon, residuals, and laws that all but vanish.
 
-Most numbers are short dyadic ones, so that ties are exact. The residual f(0) of the wall being left, down
-to 1e-90 and of either sign, decides what is met where the flight returns to its wall exactly when something
-else happens: a crossing of y = 0, a corner, the horizon. A value whose terms are known well may be known
-badly itself where waves cancel to a part of 1e-4 to 1e-13: what is looked for there is near such a wall by
-parts of what is left of it.
+Most numbers are short dyadic ones, so that ties are exact. The residual f(0) of the wall being
+left, down to 1e-90 and of either sign, decides what is met where the flight returns to its wall
+exactly when something else happens: a crossing of y = 0, a corner, the horizon. A value whose terms
+are known well may be known badly itself where waves cancel to a part of 1e-4 to 1e-13: what is
+looked for there is near such a wall by parts of what is left of it.
 """
 
 import math
@@ -15,8 +15,17 @@ from mpmath import MPContext
 
 from conformance import plain
 from conformance.cases.draw import NEVER, Draw, Family, Question, Unfit
-from conformance.cases.scenes import SIDES, TABLES, Clock, clock, many_legs, off_its_wall, scene, state
-from scene import BangBang, Cap, Collision, Fourier, Law, Mushroom, Scene, State, Stem, Wall
+from conformance.cases.scenes import (
+    SIDES,
+    TABLES,
+    Clock,
+    clock,
+    many_legs,
+    off_its_wall,
+    scene,
+    state,
+)
+from scene import BangBang, Cap, Collision, Fourier, GivenLaw, Mushroom, Scene, State, Stem, Wall
 from scene.laws import value
 from scene.tables import laws
 from scene.transforms import scaled, scaled_state
@@ -34,23 +43,32 @@ def at_or_next_to(draw: Draw, t: float) -> float:
     return math.nextafter(t, draw.pick((t, t, math.inf, -math.inf)))
 
 
-def moved(draw: Draw, size: float, at: float) -> Law:
-    """Draw a law that is `size` at time `at`, at rest then or half way down a leg; sometimes a number."""
+def moved(draw: Draw, size: float, at: float) -> GivenLaw:
+    """Draw a law that is `size` at time `at`, at rest then or half way down a leg.
+
+    Sometimes a number.
+    """
     if draw.pick((True, False)):
         return size
     other = size * draw.pick((0.75, 0.875, 1.125, 1.25))
     if draw.pick((True, False)):
         return BangBang(knots=((at, size), (at + 1.0, other), (at + PERIOD, size)))
-    return BangBang(knots=((at - 1.0, 2 * size - other), (at + 1.0, other), (at + 3.0, 2 * size - other)))
+    return BangBang(
+        knots=((at - 1.0, 2 * size - other), (at + 1.0, other), (at + 3.0, 2 * size - other))
+    )
 
 
 def dyadic(draw: Draw, at: float) -> tuple[Scene, list[tuple[float, float]]]:
-    """Draw a scene of short dyadic sizes at time `at`, and list its corners and edges of then, x > 0.
+    """Draw a scene of short dyadic sizes at time `at`, and list its corners and edges, x > 0.
 
     A length moves by at most a quarter of itself: h slope <= 0.08 < 0.18 <= w <= 0.47 < 0.75 <= r.
     """
-    w, h, slope = draw.pick((0.25, 0.375)), draw.pick((0.5, 1.0)), draw.pick((0.0, 0.0625, -0.25))
-    top, feet, table = [(1.0, 0.0)], [(w, 0.0), (w - slope * h, -h)], draw.pick(TABLES)
+    w = draw.pick((0.25, 0.375))
+    h = draw.pick((0.5, 1.0))
+    slope = draw.pick((0.0, 0.0625, -0.25))
+    top = [(1.0, 0.0)]
+    feet = [(w, 0.0), (w - slope * h, -h)]
+    table = draw.pick(TABLES)
     if table == "cap":
         return Cap(r=moved(draw, 1.0, at)), top
     width, depth = moved(draw, w, at), moved(draw, h, at)
@@ -69,20 +87,24 @@ def corner_start(draw: Draw) -> Question:
     t = PERIOD * draw.pick((0, 0, 1, -3, 100))
     wall: Wall | None = draw.pick((*of.walls, None))
     return Question(
-        of, State(t, x, y, draw.pick(SPEEDS), draw.pick(SPEEDS), wall), t + draw.pick((0.0, 2.0**-20, 5.0))
+        of,
+        State(t, x, y, draw.pick(SPEEDS), draw.pick(SPEEDS), wall),
+        t + draw.pick((0.0, 2.0**-20, 5.0)),
     )
 
 
 def corner_arrival(draw: Draw) -> Question:
     """Fly to a corner or to the mouth's edge: exactly, or missed by 2^-26 to 2^-50."""
-    dt, (of, corners) = draw.pick(ARRIVALS), dyadic(draw, 0.0)
-    (x, y), side = draw.pick(corners), draw.pick((1.0, -1.0))
+    dt = draw.pick(ARRIVALS)
+    of, corners = dyadic(draw, 0.0)
+    x, y = draw.pick(corners)
+    side = draw.pick((1.0, -1.0))
     is_below = isinstance(of, Stem) or y < 0
-    x0, y0 = (
-        draw.pick((0.0, 0.0625, -0.125)),
-        -draw.pick((0.125, 0.25)) if is_below else draw.pick((0.125, 0.25)),
-    )
-    vx, vy, t = (side * x - x0) / dt, (y - y0) / dt, PERIOD * draw.pick((0, 0, 1, -3, 100)) - dt
+    x0 = draw.pick((0.0, 0.0625, -0.125))
+    y0 = -draw.pick((0.125, 0.25)) if is_below else draw.pick((0.125, 0.25))
+    vx = (side * x - x0) / dt
+    vy = (y - y0) / dt
+    t = PERIOD * draw.pick((0, 0, 1, -3, 100)) - dt
     miss = draw.pick((0.0, draw.power(-50, -26), -draw.power(-50, -26)))
     return Question(
         of,
@@ -92,19 +114,25 @@ def corner_arrival(draw: Draw) -> Question:
 
 
 def hit_at_end(draw: Draw) -> Question:
-    """Fly straight at a wall that is met exactly at the horizon, or a unit in the last place beside it.
+    """Fly straight at a wall that is met at the horizon, or a unit in the last place beside it.
 
     Sometimes the wall rests at a knot then, behind which is a violent leg.
     """
-    dt, size, side = draw.pick(ARRIVALS), draw.pick((1.0, 1.5)), draw.pick((1.0, -1.0))
-    knot, quick, t_end = at_or_next_to(draw, dt), draw.power(-40, -1), at_or_next_to(draw, dt)
+    dt = draw.pick(ARRIVALS)
+    size = draw.pick((1.0, 1.5))
+    side = draw.pick((1.0, -1.0))
+    knot = at_or_next_to(draw, dt)
+    quick = draw.power(-40, -1)
+    t_end = at_or_next_to(draw, dt)
     law = moved(draw, size, dt)
     if draw.pick((False, True)):
-        other, times = draw.between(0.3, 4.0), (0.0, knot, knot + quick, knot + quick + 1.0, PERIOD)
+        other = draw.between(0.3, 4.0)
+        times = (0.0, knot, knot + quick, knot + quick + 1.0, PERIOD)
         law = BangBang(knots=tuple(zip(times, (size, size, other, other, size), strict=True)))
         t_end = draw.pick((t_end, 3.9))
     room = size * draw.pick((0.25, 0.5, 0.75))
-    speed, turns = room / dt, PERIOD * draw.pick((0, 0, 1, 1024, -2))
+    speed = room / dt
+    turns = PERIOD * draw.pick((0, 0, 1, 1024, -2))
     asked: tuple[tuple[Scene, State], ...] = (
         (Cap(r=law), State(turns, 0.0, size - room, 0.0, speed)),
         (Stem(w=1.0, h=law), State(turns, 0.25, room - size, 0.0, -speed)),
@@ -120,42 +148,53 @@ def hit_at_end(draw: Draw) -> Question:
 def knot_at_event(draw: Draw) -> Question:
     """Put a knot next to the time of a hit, or of a crossing of y = 0, on a path that is known.
 
-    The path is followed with all walls at rest. The law that decides it then has a sudden leg: before that
-    time, after it or within its rounding. Which side of it the time lies on decides the outcome, and a
-    stepper that knows the time only to some digits must keep both.
+    The path is followed with all walls at rest. The law that decides it then has a sudden leg:
+    before that time, after it or within its rounding. Which side of it the time lies on decides the
+    outcome, and a stepper that knows the time only to some digits must keep both.
     """
     of = Mushroom(
-        r=draw.short(0.6, 1.5), w=draw.short(0.1, 0.4), h=draw.short(0.3, 2.0), slope=draw.short(-0.2, 0.004)
+        r=draw.short(0.6, 1.5),
+        w=draw.short(0.1, 0.4),
+        h=draw.short(0.3, 2.0),
+        slope=draw.short(-0.2, 0.004),
     )
     start, _ = state(draw, of, {"t": 0.0, "site": draw.pick(("cap", "stem")), "speed": 0.25})
     before: list[Any] = [start, *plain.trajectory(of, start, 3, NEVER)]
-    n, known = draw.pick((1, 1, 2, 3)), laws(of)
+    n = draw.pick((1, 1, 2, 3))
+    known = laws(of)
     if not all(isinstance(hit, State | Collision) for hit in before) or len(before) <= n:
         raise Unfit("no such hit")
     last, hit = before[n - 1 : n + 1]
-    name, time = {"arc": "r", "floor": "h", "base": "w"}.get(hit.wall, draw.pick(("w", "slope"))), hit.t
+    name = {"arc": "r", "floor": "h", "base": "w"}.get(hit.wall, draw.pick(("w", "slope")))
+    time = hit.t
     if hit.wall != "base" and last.y * hit.y < 0 and draw.pick((True, False)):
-        name, time = "w", last.t - last.y / last.vy
+        name = "w"
+        time = last.t - last.y / last.vy
     width = draw.power(-52, -30) * draw.between(1.0, 2.0)
-    begin, size = time + width * draw.pick((-2.0, -1.0, -0.5, -0.1, 0.0, 0.1, 1.0)), float(getattr(of, name))
+    begin = time + width * draw.pick((-2.0, -1.0, -0.5, -0.1, 0.0, 0.1, 1.0))
+    size = float(getattr(of, name))
     end = max(begin + width, math.nextafter(begin, math.inf))
-    other, times = draw.pick((0.25, 0.5, 2.0)) * size, (0.0, begin, end, end + draw.between(0.05, 2.0), 64.0)
+    other = draw.pick((0.25, 0.5, 2.0)) * size
+    times = (0.0, begin, end, end + draw.between(0.05, 2.0), 64.0)
     leg = BangBang(knots=tuple(zip(times, (size, size, other, other, size), strict=True)))
     turns = draw.pick((0.0, 64.0, -64.0, draw.power(12, 110)))
     late = State(turns, start.x, start.y, start.vx, start.vy, start.wall)
     bits = math.log2(max(turns, 1.0)) - math.log2(width) + draw.pick(range(-16, 4))
     working = min(max(round((bits - 8) / math.log2(10)), 6), 60)
-    return Question(Mushroom(**known | {name: leg}), late, NEVER, n + draw.pick((0, 1)), working=working)  # type: ignore[arg-type]
+    other_scene = Mushroom(**known | {name: leg})  # type: ignore[arg-type]
+    return Question(other_scene, late, NEVER, n + draw.pick((0, 1)), working=working)
 
 
 def across_a_knot(draw: Draw) -> Question:
     """Leave a wall just before a knot, late, and meet it again just after another."""
-    period, which = draw.pick((0.5, 1.0, 3.0)), draw.pick(("r", "h", "w"))
+    period = draw.pick((0.5, 1.0, 3.0))
+    which = draw.pick(("r", "h", "w"))
     law = many_legs(draw, 0.6, 2.0, period, draw.pick((3, 4, 5)))
     (t0, _), (t1, _) = law.knots[0:2]
     t = period * draw.pick((0, 0, 1, 100, 1000)) + t1 - (t1 - t0) * 10.0 ** -draw.between(0.5, 6.0)
-    sizes: dict[str, Law] = {"r": 4.0, "h": 1.0, "w": 0.3, which: law}
-    wall: Wall = {"r": "arc", "h": "floor", "w": draw.pick(SIDES)}[which]  # type: ignore[assignment]
+    sizes: dict[str, GivenLaw] = {"r": 4.0, "h": 1.0, "w": 0.3, which: law}
+    walls: dict[str, Wall] = {"r": "arc", "h": "floor", "w": draw.pick(SIDES)}
+    wall = walls[which]
     of = Mushroom(**sizes)  # type: ignore[arg-type]
     leaving, _ = state(
         draw, of, {"t": t, "site": wall, "speed": draw.power(-6, 0), "lift": draw.power(-50, -3)}
@@ -164,7 +203,7 @@ def across_a_knot(draw: Draw) -> Question:
 
 
 def rise_and_fall(low: float, high: float, t: float) -> tuple[BangBang, float]:
-    """Return a law that rises for a time 1 and falls for a time 1, and its value at t and at 2 - t."""
+    """Return a law that rises and falls for a time 1 each, and its value at t and at 2 - t."""
     share = 2 * t * t if t <= 0.5 else 1 - 2 * (1 - t) * (1 - t)
     return BangBang(knots=((0.0, low), (1.0, high), (2.0, low))), low + (high - low) * share
 
@@ -174,18 +213,23 @@ def tiny_slope(draw: Draw) -> Question:
 
     Its lean may vanish, and come back, on the way.
     """
-    t, speed = draw.pick((0.25, 0.5, 0.125, 0.75)), draw.pick((1.0, 0.5, 0.25, 0.0))
+    t = draw.pick((0.25, 0.5, 0.125, 0.75))
+    speed = draw.pick((1.0, 0.5, 0.25, 0.0))
     width, half = rise_and_fall(*draw.pick(((1.0, 2.0), (0.5, 0.75), (1.0, 1.125))), t)
-    lean, wall, back = draw.pick((1.0, -1.0)) * draw.power(-400, -40), draw.pick(SIDES), 2 - t
+    lean = draw.pick((1.0, -1.0)) * draw.power(-400, -40)
+    wall = draw.pick(SIDES)
+    back = 2 - t
     first, last = draw.pick(((lean, 0.0), (0.0, lean), (lean, -lean)))
     vanishing = BangBang(knots=((0.0, first), (draw.pick((back, 1.0)), last), (2.0, first)))
-    slopes: tuple[Law, ...] = lean, vanishing
-    slope, y = draw.pick(slopes), -speed * (2 - 2 * t) if speed and draw.pick((True, False)) else -1.5
+    slopes: tuple[GivenLaw, ...] = lean, vanishing
+    slope = draw.pick(slopes)
+    y = -speed * (2 - 2 * t) if speed and draw.pick((True, False)) else -1.5
     tables: tuple[Scene, ...] = (
         Stem(w=width, h=4.0, slope=slope),
         Mushroom(r=4.0, w=width, h=4.0, slope=slope),
     )
-    turn, x = 2.0 * draw.pick((0, 0, 1, -5, 512)), half if wall == "right" else -half
+    turn = 2.0 * draw.pick((0, 0, 1, -5, 512))
+    x = half if wall == "right" else -half
     leaving = State(turn + t, x, y, 0.0, speed, wall)
     return Question(draw.pick(tables), leaving, turn + draw.pick((3.0, at_or_next_to(draw, back))))
 
@@ -203,17 +247,23 @@ def on_the_wall(draw: Draw) -> Question:
         return Question(of, off_its_wall(draw, of, leaving), max(t_end, t + 8.0))
     by = 1.0 - draw.power(-12, -4)
     return Question(
-        of, msgspec.structs.replace(leaving, x=leaving.x * by, y=leaving.y * by), max(t_end, t + 8.0)
+        of,
+        msgspec.structs.replace(leaving, x=leaving.x * by, y=leaving.y * by),
+        max(t_end, t + 8.0),
     )
 
 
 def extreme_scale(draw: Draw) -> Question:
-    """Ask a plain question with lengths and times scaled by powers of two up to 2^+-390, together."""
+    """Ask a plain question with lengths and times scaled by powers of two up to 2^+-390."""
     of = scene(draw, draw.pick(TABLES), clock(draw))
     start, t_end = state(draw, of, {})
-    length, units = draw.pick(range(-LARGEST, LARGEST + 1)), draw.pick(range(-LARGEST, LARGEST + 1))
-    units = min(max(units, length - 380), length + 380)  # speeds beyond 2^400 are refused by every stepper
-    return Question(scaled(of, length, units), scaled_state(start, length, units), 2.0**units * t_end)
+    length = draw.pick(range(-LARGEST, LARGEST + 1))
+    units = draw.pick(range(-LARGEST, LARGEST + 1))
+    # Speeds beyond 2^400 are refused by every stepper.
+    units = min(max(units, length - 380), length + 380)
+    return Question(
+        scaled(of, length, units), scaled_state(start, length, units), 2.0**units * t_end
+    )
 
 
 def rest_and_sweep(draw: Draw) -> Question:
@@ -224,15 +274,22 @@ def rest_and_sweep(draw: Draw) -> Question:
     vx, vy = (size * number for number in draw.direction())
     if isinstance(of, Mushroom) and start.y == 0:
         vy = abs(vy) + draw.power(-9, 0)
-    return Question(of, State(start.t, start.x, start.y, vx, vy), start.t + draw.pick((1.0, 7.0, 30.0)))
+    return Question(
+        of, State(start.t, start.x, start.y, vx, vy), start.t + draw.pick((1.0, 7.0, 30.0))
+    )
 
 
 def slow_towards_waves(draw: Draw) -> Question:
-    """Come within thousands of periods to a wall of several harmonics, never all at their least together."""
+    """Meet a wall of several harmonics after thousands of periods.
+
+    The harmonics are never all at their least together.
+    """
     sin, cos = (tuple(draw.between(-0.05, 0.05) for _ in range(n)) for n in (3, 2))
     law = Fourier(mean=1.0, period=draw.pick((1.0, 0.375)), sin=(0.1, *sin), cos=cos)
-    v, across = 10.0 ** -draw.between(2.0, 5.0), draw.pick((0.0, 0.125, -0.5))
-    t, inside = draw.between(-9.0, 9.0), draw.between(0.25, 0.6)
+    v = 10.0 ** -draw.between(2.0, 5.0)
+    across = draw.pick((0.0, 0.125, -0.5))
+    t = draw.between(-9.0, 9.0)
+    inside = draw.between(0.25, 0.6)
     options: tuple[tuple[Scene, State], ...] = (
         (Stem(w=1.0, h=law), State(t, 0.0, -inside, across * v / 4, -v)),
         (Stem(w=law, h=1.0), State(t, draw.pick((1.0, -1.0)) * inside, -0.5, v, across * v / 4)),
@@ -243,7 +300,10 @@ def slow_towards_waves(draw: Draw) -> Question:
 
 
 def sunk(n: int, left: float, least: float = 0.0) -> Fourier:
-    """Return ((1 - cos 2 pi (t - least)) / 2)^n + left, of period 1: flatter at its least the higher n is."""
+    """Return ((1 - cos 2 pi (t - least)) / 2)^n + left, of period 1.
+
+    The higher n is, the flatter is the law at its least.
+    """
     waves = [math.comb(2 * n, n - k) * (-1.0) ** k * 2.0 / 4.0**n for k in range(1, n + 1)]
     angles = [2 * math.pi * k * least for k in range(1, n + 1)]
     cos = tuple(wave * math.cos(angle) for wave, angle in zip(waves, angles, strict=True))
@@ -255,15 +315,21 @@ def _next_to_nothing(draw: Draw) -> tuple[Fourier, float]:
     """Draw a law of which little is left, and a time about its least; by rounding it may vanish."""
     least = draw.pick((0.0, 0.25, draw.part(), draw.part()))
     law = sunk(draw.pick((1, 1, 2)), 10.0 ** -draw.between(4.0, 13.0), least)
-    return law, least + draw.pick((0.0, 1.0, -3.0)) + draw.pick((1.0, -1.0)) * 10.0 ** -draw.between(3.0, 8.0)
+    return law, least + draw.pick((0.0, 1.0, -3.0)) + draw.pick(
+        (1.0, -1.0)
+    ) * 10.0 ** -draw.between(3.0, 8.0)
 
 
 def nearly_shut(draw: Draw) -> Question:
-    """Start, or cross the mouth, beside a wall that all but vanishes, by a small part of what is left."""
+    """Start, or cross the mouth, beside a wall that all but vanishes.
+
+    The distance is a small part of what is left of the wall.
+    """
     law, t = _next_to_nothing(draw)
     part = draw.pick((1.0, -1.0)) * 10.0 ** -draw.between(4.0, 11.0)
     size = float(value(FINE, law, FINE.mpf(t)) * (1 + FINE.mpf(part)))
-    x, made = size * draw.pick((1.0, -1.0)), Mushroom(r=1.5, w=law, h=1.0)
+    x = size * draw.pick((1.0, -1.0))
+    made = Mushroom(r=1.5, w=law, h=1.0)
     before = draw.power(-40, -20)  # and so much later, or as exactly as times are, at the mouth
     asked: tuple[tuple[Scene, State], ...] = (
         (Stem(w=1.0, h=law), State(t, 0.25, -size, 0.0, 1.0)),
@@ -277,7 +343,8 @@ def nearly_shut(draw: Draw) -> Question:
 def all_but_gone(draw: Draw) -> Question:
     """Fly to an arc, a floor or a side that is about to be, or has just been, next to nothing."""
     law, t = _next_to_nothing(draw)
-    speed, across = draw.power(-3, 7), draw.between(-1.0, 1.0)
+    speed = draw.power(-3, 7)
+    across = draw.between(-1.0, 1.0)
     asked: tuple[tuple[Scene, State], ...] = (
         (Cap(r=law), State(t, 0.0, 0.0, across * speed, speed, "base")),
         (Stem(w=1.0, h=law), State(t, 0.25, 0.0, across / 10 * speed, -speed, "base")),
@@ -289,7 +356,10 @@ def all_but_gone(draw: Draw) -> Question:
 FAMILIES = (
     Family("corner-start", "a named wall hides that the place lies on a second one", corner_start),
     Family(
-        "corner-arrival", "an edge missed by 1e-8 to 1e-15, or not at all", corner_arrival, is_delicate=True
+        "corner-arrival",
+        "an edge missed by 1e-8 to 1e-15, or not at all",
+        corner_arrival,
+        is_delicate=True,
     ),
     Family(
         "hit-at-end",
@@ -299,7 +369,8 @@ FAMILIES = (
     ),
     Family(
         "knot-at-event",
-        "one piece of a law decides, though the enclosed time of an event or a crossing touches several",
+        "one piece of a law decides, though the enclosed time of an event or a crossing touches"
+        " several",
         knot_at_event,
         is_delicate=True,
     ),
@@ -311,8 +382,14 @@ FAMILIES = (
         is_delicate=True,
     ),
     Family("on-the-wall", "a state is on its wall by the largest size of all time", on_the_wall),
-    Family("extreme-scale", "squares overflow or vanish, though every number is in range", extreme_scale),
-    Family("rest-and-sweep", "a particle at rest is never hit, or divided by its speed", rest_and_sweep),
+    Family(
+        "extreme-scale",
+        "squares overflow or vanish, though every number is in range",
+        extreme_scale,
+    ),
+    Family(
+        "rest-and-sweep", "a particle at rest is never hit, or divided by its speed", rest_and_sweep
+    ),
     Family(
         "slow-towards-waves",
         "walls go as far as all their waves together: the first hit is lost",

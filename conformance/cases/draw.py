@@ -1,9 +1,10 @@
 """One source of everything that is drawn at random: a stream of bits, and the questions made of it.
 
-A stream is seeded by a key, and then the same on every machine and in every version of Python: only integer
-bits are drawn, and floats come from + - * / and sqrt alone, so no libm takes part. Or Hypothesis draws the
-bits (`conformance.strategies`), and shrinks them: of several options the first is the simplest. A family is a
-function from a stream to a question: what is asked, and how it is filed once its answer is proved.
+A stream is seeded by a key, and then the same on every machine and in every version of Python: only
+integer bits are drawn, and floats come from + - * / and sqrt alone, so no libm takes part. Or
+Hypothesis draws the bits (`conformance.strategies`), and shrinks them: of several options the first
+is the simplest. A family is a function from a stream to a question: what is asked, and how it is
+filed once its answer is proved.
 """
 
 import math
@@ -23,7 +24,10 @@ ATTEMPTS = 4000  # draws for one question
 
 
 class Unfit(Exception):  # noqa: N818 (a finding about the draw)
-    """What is drawn is no question of its kind, or has no certified answer; another must be drawn."""
+    """What is drawn is no question of its kind, or has no certified answer.
+
+    Another must be drawn.
+    """
 
 
 class Draw:
@@ -53,7 +57,8 @@ class Draw:
 
     def short(self, low: float, high: float) -> float:
         """Draw a number of at most four decimals from [low, high], if it holds one."""
-        least, most = math.ceil(low * 10_000), math.floor(high * 10_000)
+        least = math.ceil(low * 10_000)
+        most = math.floor(high * 10_000)
         if most < least:
             return self.between(low, high)
         return (least + self.bits(30) % (most - least + 1)) / 10_000
@@ -69,7 +74,8 @@ class Draw:
     def direction(self) -> tuple[float, float]:
         """Draw a unit vector: a rational point of the circle, in any octant."""
         p = self.part()
-        c, s = (1 - p * p) / (1 + p * p), 2 * p / (1 + p * p)
+        c = (1 - p * p) / (1 + p * p)
+        s = 2 * p / (1 + p * p)
         if self.pick((False, True)):
             c, s = s, c
         return c * self.pick((1.0, -1.0)), s * self.pick((1.0, -1.0))
@@ -95,7 +101,9 @@ def leaves(data: Any, label: str = "") -> Iterator[tuple[str, float]]:
             yield from leaves(part, name)
     elif isinstance(data, list | tuple):
         for i, part in enumerate(data):
-            yield from leaves(part, label if isinstance(part, list | tuple) else f"{label}{min(i, 2)}")
+            yield from leaves(
+                part, label if isinstance(part, list | tuple) else f"{label}{min(i, 2)}"
+            )
     elif isinstance(data, int | float):
         yield label, float(data)
 
@@ -115,7 +123,8 @@ class Question(NamedTuple):
         scene: table and laws; in the wire's form where they may be none.
         state: the start.
         t_end: horizon [time].
-        collisions: None for a step; for a trajectory how many are tried, for a flow how many at most.
+        collisions: None for a step; for a trajectory how many are tried, for a flow how many at
+            most.
         is_flow: whether it asks for a flow, whose path has all collisions up to t_end.
         longest: condition number up to which a trajectory or a flow is followed.
         level: None to measure it.
@@ -153,7 +162,8 @@ class Family(NamedTuple):
     Attributes:
         name: it names questions for ever, with a seed and a number.
         aim: what it tests, or the mistake that it hunts.
-        ask: from a stream of numbers to a question; it may raise Unfit or BadInput for another draw.
+        ask: from a stream of numbers to a question; it may raise Unfit or BadInput for another
+            draw.
         source: place in the paper, or hard case.
         weight: how many are in each round of a run's questions.
         meets: the wall that such a question meets first; None for any.
@@ -175,7 +185,8 @@ class Family(NamedTuple):
             BadInput: they have none.
         """
         for attempt in range(ATTEMPTS):
-            if question := self.attempt(Draw(f"{self.name}/{key}/{attempt}")):
+            question = self.attempt(Draw(f"{self.name}/{key}/{attempt}"))
+            if question:
                 return question
         raise BadInput(f"{self.name}/{key}: none of {ATTEMPTS} draws is a question")
 
@@ -185,12 +196,13 @@ class Family(NamedTuple):
             asked = self.ask(draw)
         except (BadInput, Unfit):
             return None
-        rule, source = asked.rule or self.aim, asked.source or self.source
+        rule = asked.rule or self.aim
+        source = asked.source or self.source
         return asked._replace(group=self.name, rule=rule, source=source)
 
 
 class Proved(NamedTuple):
-    """What is certified: the right answers, how delicate they are, and how many collisions they have."""
+    """What is certified: the right answers, their condition, and the number of collisions."""
 
     expect: tuple[Expectation, ...]
     condition: float = 0.0

@@ -1,15 +1,17 @@
-"""A run's own questions: drawn from its seed by the weights of the table, proved while the suite waits.
+"""A run's own questions: drawn from its seed by weight, proved while the suite waits.
 
-A stepper that is right in the scenes of the corpus, and wrong in others, passes all of it, whatever symmetry
-it is asked in. So a run asks questions that no file holds. The rows of the table that have a weight are dealt
-in rounds: each round holds every row as often as its weight says, in an order drawn from the seed. A third of
-the questions ask for a trajectory or a flow, as often the one as the other: paths and ensembles often have
-an engine of their own, which no step shows. Scenes carry names, which mean nothing.
+A stepper that is right in the scenes of the corpus, and wrong in others, passes all of it, whatever
+symmetry it is asked in. So a run asks questions that no file holds. The rows of the table that have
+a weight are dealt in rounds: each round holds every row as often as its weight says, in an order
+drawn from the seed. A third of the questions ask for a trajectory or a flow, as often the one as
+the other: paths and ensembles often have an engine of their own, which no step shows. Scenes carry
+names, which mean nothing.
 
-Answers are certified as those of the corpus, and no more delicate than those of level core, but for late
-ones, whose time when rounded tells less of the phase, and those in stems so deep that y when rounded tells
-less than x: these than level extended. All are filed as of level core. The plain stepper chooses which draws
-are asked: those that meet the wall that is looked for, and keep it when nudged.
+Answers are certified as those of the corpus, and no more delicate than those of level core, but for
+late ones, whose time when rounded tells less of the phase, and those in stems so deep that y when
+rounded tells less than x: these than level extended. All are filed as of level core. The plain
+stepper chooses which draws are asked: those that meet the wall that is looked for, and keep it when
+nudged.
 """
 
 from math import inf
@@ -79,12 +81,16 @@ def _is_wanted(question: Question, family: Family) -> bool:
     """Tell whether the plain stepper meets the wall that is looked for, from starts nearby too."""
     of = from_data(question.scene)
     met = plain.next_collision(of, question.state, question.t_end)
-    return isinstance(met, Collision) and family.meets in (None, met.wall) and _is_steady(of, question)
+    return (
+        isinstance(met, Collision) and family.meets in (None, met.wall) and _is_steady(of, question)
+    )
 
 
 def _asked(draw: Draw, kind: Kind, asked: Question) -> Question | None:
     """Return a question of a kind, filed; None where fewer hits follow than it is to have."""
-    of, start, t_end = asked.scene, asked.state, asked.t_end
+    of = asked.scene
+    start = asked.state
+    t_end = asked.t_end
     assert not isinstance(of, dict)
     data: dict[str, Any] = wire_form(of) | ({"name": of.name} if of.name else {})
     longest = min(asked.longest, CONDITIONS[_delicacy(of, start)])
@@ -97,16 +103,21 @@ def _asked(draw: Draw, kind: Kind, asked: Question) -> Question | None:
     hits = plain.trajectory(of, start, n_hits + 1, t_end)
     if not all(isinstance(hit, Collision) for hit in hits[:n_hits]):
         return None
-    before, after = hits[n_hits - 1], hits[-1]
+    before = hits[n_hits - 1]
+    after = hits[-1]
     if kind == "trajectory":
         return question._replace(collisions=n_hits)
-    if len(hits) <= n_hits or not isinstance(before, Collision) or not isinstance(after, Collision | Horizon):
+    if (
+        len(hits) <= n_hits
+        or not isinstance(before, Collision)
+        or not isinstance(after, Collision | Horizon)
+    ):
         return None
     return question._replace(t_end=(before.t + after.t) / 2, collisions=n_hits + 1, is_flow=True)
 
 
 def _is_steady(of: Scene, question: Question) -> bool:
-    """Tell whether the plain stepper meets the same walls from starts nearby: it answers none of this.
+    """Tell whether the plain stepper meets the same walls from starts nearby.
 
     Of a flow it is captured between the same hits, too.
     """
@@ -114,7 +125,9 @@ def _is_steady(of: Scene, question: Question) -> bool:
     def met(start: State) -> list[str | int]:
         path = plain.trajectory(of, start, question.collisions or 1, question.t_end)
         walls = [hit.wall if isinstance(hit, Collision) else type(hit).__name__ for hit in path]
-        ((_, stay),) = plain.flow(of, [start], question.t_end) if question.is_flow else [(None, None)]
+        ((_, stay),) = (
+            plain.flow(of, [start], question.t_end) if question.is_flow else [(None, None)]
+        )
         times = [hit.t for hit in path if isinstance(hit, Collision)]
         return [*walls, *(sum(hit <= t for hit in times) for t in stay or ())]
 
@@ -127,8 +140,8 @@ def _is_steady(of: Scene, question: Question) -> bool:
 def _delicacy(of: Scene, start: State) -> Level:
     """Return the level that says how delicate a question may be.
 
-    Late, a part of the time is a phase; of a very deep stem a part of y is much of its width, though not an
-    error of x that is a part of x.
+    Late, a part of the time is a phase; of a very deep stem a part of y is much of its width,
+    though not an error of x that is a part of x.
     """
     is_late = abs(start.t) > 2.0 ** (LATE[0] - 1) * (of.period or inf)
     return "extended" if is_late or is_leaning(of) else "core"

@@ -1,7 +1,7 @@
-"""Good and bad questions for each rule about scenes and laws (`scene.protocol.rules`), drawn from a stream.
+"""Good and bad questions for each rule about scenes and laws (`scene.protocol.rules`).
 
-A function has the name of its rule with hyphens as underscores: (draw, is_kept) -> RuleCase. `rule` enters it
-into DRAWS. `conformance.cases.rules` has the rules about states, requests and answers.
+A function has the name of its rule with hyphens as underscores: (draw, is_kept) -> RuleCase. `rule`
+enters it into DRAWS. `conformance.cases.rules` has the rules about states, requests and answers.
 """
 
 import json
@@ -19,7 +19,9 @@ CAP: Data = {"table": "cap", "r": 1.0}
 STEM: Data = {"table": "stem", "w": 1.0, "h": 1.25}
 MUSHROOM: Data = {"table": "mushroom", "r": 1.0, "w": 0.5, "h": 1.0}
 INSIDE = {"cap": (0.125, 0.25), "stem": (0.125, -0.25), "mushroom": (0.125, 0.25)}
-BRIEF, LONG = 2.0**-12, 4.0  # times in which a particle at INSIDE, with speed 1, meets no wall, and meets one
+# Times in which a particle at INSIDE, with speed 1, meets no wall, and meets one.
+BRIEF = 2.0**-12
+LONG = 4.0
 FURTHER: tuple[tuple[str, Any], ...] = (
     ("hint", 7.0),
     ("T", None),
@@ -34,9 +36,10 @@ class RuleCase(NamedTuple):
     """A question on one side of a rule.
 
     Attributes:
-        request: a request of the protocol; for a rule of duty REJECT that is broken only `rejected` passes.
-        as_read: the request whose right answer passes: this one, or the one without a field that may be
-            ignored; None where only `rejected` passes.
+        request: a request of the protocol; for a rule of duty REJECT that is broken only `rejected`
+            passes.
+        as_read: the request whose right answer passes: this one, or the one without a field that
+            may be ignored; None where only `rejected` passes.
         line: the request as text where an object has a field twice; else empty.
         answer: of a rule for answers, an answer to the request, as text; else empty.
     """
@@ -62,7 +65,9 @@ def rule(function: Sides) -> Sides:
     return function
 
 
-def ask(draw: Draw, scene: Mapping[str, Any], state: Data | None = None, span: float | None = None) -> Data:
+def ask(
+    draw: Draw, scene: Mapping[str, Any], state: Data | None = None, span: float | None = None
+) -> Data:
     """Return a request for a step in a scene: from a place inside, or from a state.
 
     Args:
@@ -77,7 +82,13 @@ def ask(draw: Draw, scene: Mapping[str, Any], state: Data | None = None, span: f
         vx, vy = draw.direction()
         state = {"t": 0.0, "x": x, "y": y, "vx": vx, "vy": vy, "wall": None}
     seq = draw.pick(range(1, 2**20))
-    return {"cmd": "step", "seq": seq, "scene": dict(scene), "state": state, "t_end": state["t"] + span}
+    return {
+        "cmd": "step",
+        "seq": seq,
+        "scene": dict(scene),
+        "state": state,
+        "t_end": state["t"] + span,
+    }
 
 
 def good(request: Data) -> RuleCase:
@@ -148,23 +159,30 @@ def one_mouth(draw: Draw, is_kept: bool) -> RuleCase:
     either = draw.pick(({"w": 0.5}, {"nu": 0.5}))
     both = draw.pick(({"w": 0.5, "nu": 0.5}, {}))
     return one_of(
-        ask(draw, {"table": "mushroom", "r": 1.0, "h": 1.0, **(either if is_kept else both)}), is_kept
+        ask(draw, {"table": "mushroom", "r": 1.0, "h": 1.0, **(either if is_kept else both)}),
+        is_kept,
     )
 
 
 def _near(draw: Draw, bound: float, far: float, is_kept: bool) -> float | Data:
-    """Return a law that comes as near to a bound as 2^-40, from far away, and passes it unless it is kept."""
+    """Return a law that comes as near to a bound as 2^-40, or passes it if it is not kept.
+
+    Elsewhere it is far away from the bound.
+    """
     past = draw.power(-40, -2) * (far - bound) * (1.0 if is_kept else -1.0)
     if draw.pick((False, True)):
         return bound + past
-    mean, size = (far + bound + past) / 2, (far - bound - past) / 2
+    mean = (far + bound + past) / 2
+    size = (far - bound - past) / 2
     return wave(draw, mean=mean, cos=[size * draw.pick((1.0, -1.0))], sin=[])
 
 
 @rule
 def sizes(draw: Draw, is_kept: bool) -> RuleCase:
     """Let a size come near to 0 from above, or reach below it."""
-    table, name = draw.pick(((CAP, "r"), (STEM, "w"), (STEM, "h"), (MUSHROOM, "w"), (MUSHROOM, "h")))
+    table, name = draw.pick(
+        ((CAP, "r"), (STEM, "w"), (STEM, "h"), (MUSHROOM, "w"), (MUSHROOM, "h"))
+    )
     law = _near(draw, 0.0, 0.5, is_kept)
     x = draw.power(-60, -50) if is_kept else 0.0
     state = {"t": 0.0, "x": 0.0, "y": x if table is CAP else -x, "vx": 0.0, "vy": 0.0, "wall": None}
@@ -208,7 +226,9 @@ def known_scene_fields(draw: Draw, is_kept: bool) -> RuleCase:
     scene = any_table(draw)
     request = ask(draw, scene)
     more = {**scene, "h": 1.0} if scene["table"] == "cap" and draw.pick((False, True)) else None
-    return RuleCase({**request, "scene": scene if is_kept else more or further(draw, scene, False)}, request)
+    return RuleCase(
+        {**request, "scene": scene if is_kept else more or further(draw, scene, False)}, request
+    )
 
 
 @rule
@@ -228,8 +248,16 @@ def no_null(draw: Draw, is_kept: bool) -> RuleCase:
         *(({**STEM}, (), name) for name in ("slope", "name", "notes")),
         *(({**MUSHROOM}, (), name) for name in ("slope", "nu", "name")),
         *(({**CAP, "r": wave(draw, sin=[0.01])}, ("r",), name) for name in ("cos", "sin")),
-        ({**CAP, "r": {"kind": "fourier", "mean": 1.0, "omega": 2.0, "cos": [0.05]}}, ("r",), "period"),
-        ({**CAP, "r": {"kind": "fourier", "mean": 1.0, "period": 2.0, "cos": [0.05]}}, ("r",), "omega"),
+        (
+            {**CAP, "r": {"kind": "fourier", "mean": 1.0, "omega": 2.0, "cos": [0.05]}},
+            ("r",),
+            "period",
+        ),
+        (
+            {**CAP, "r": {"kind": "fourier", "mean": 1.0, "period": 2.0, "cos": [0.05]}},
+            ("r",),
+            "omega",
+        ),
     ]
     scene, path, name = draw.pick(cases)
     holder = scene[path[0]] if path else scene
@@ -255,7 +283,9 @@ def known_kind(draw: Draw, is_kept: bool) -> RuleCase:
 @rule
 def one_rate(draw: Draw, is_kept: bool) -> RuleCase:
     """Give omega or period, or both or neither."""
-    rates = draw.pick(({"omega": 2.0}, {"period": 2.0}) if is_kept else ({"omega": 2.0, "period": 2.0}, {}))
+    rates = draw.pick(
+        ({"omega": 2.0}, {"period": 2.0}) if is_kept else ({"omega": 2.0, "period": 2.0}, {})
+    )
     law = {"kind": "fourier", "mean": 1.0, "cos": [0.05], **rates}
     return one_of(ask(draw, {**CAP, "r": law}), is_kept)
 
@@ -271,8 +301,15 @@ def positive_rate(draw: Draw, is_kept: bool) -> RuleCase:
 
 @rule
 def harmonics(draw: Draw, is_kept: bool) -> RuleCase:
-    """Give as many harmonics as are allowed, or one to some more, of which the last alone may count."""
-    n = draw.pick((MAX_HARMONICS, MAX_HARMONICS - 1)) if is_kept else MAX_HARMONICS + draw.pick((1, 1, 2, 16))
+    """Give as many harmonics as are allowed, or some more.
+
+    The last one alone may count.
+    """
+    n = (
+        draw.pick((MAX_HARMONICS, MAX_HARMONICS - 1))
+        if is_kept
+        else MAX_HARMONICS + draw.pick((1, 1, 2, 16))
+    )
     waves = [draw.pick((0.0, 0.01)) for _ in range(n - 1)] + [draw.pick((0.01, 0.0))]
     law = {**wave(draw, cos=[], sin=[]), draw.pick(("cos", "sin")): waves}
     return one_of(ask(draw, {**CAP, "r": law}), is_kept)
@@ -283,14 +320,20 @@ def knots(draw: Draw, is_kept: bool) -> RuleCase:
     """Give the least or the greatest number of knots, or one less or more."""
     n = draw.pick((2, 3, MAX_KNOTS)) if is_kept else draw.pick((1, MAX_KNOTS + 1, MAX_KNOTS + 64))
     values = [1.0 + draw.pick((0.0, 0.125)) for _ in range(max(n - 2, 0))]
-    law = legs([[i / 256, value] for i, value in enumerate([1.0, *values, 1.0][:n] if n > 1 else [1.0])])
+    law = legs(
+        [[i / 256, value] for i, value in enumerate([1.0, *values, 1.0][:n] if n > 1 else [1.0])]
+    )
     return one_of(ask(draw, {**CAP, "r": law}), is_kept)
 
 
 @rule
 def rising_times(draw: Draw, is_kept: bool) -> RuleCase:
     """Let the times of knots increase by one ulp at least, or stand still or run back."""
-    second = math.nextafter(0.5, 1.0) if is_kept else draw.pick((0.5, math.nextafter(0.5, 0.0), 0.25, -1.0))
+    second = (
+        math.nextafter(0.5, 1.0)
+        if is_kept
+        else draw.pick((0.5, math.nextafter(0.5, 0.0), 0.25, -1.0))
+    )
     law = legs([[0.0, 1.0], [0.5, 1.0], [second, 1.0], [1.0, 1.0]])
     return one_of(ask(draw, {**CAP, "r": law}), is_kept)
 
@@ -309,7 +352,8 @@ def exact_period(draw: Draw, is_kept: bool) -> RuleCase:
         ((0.25, 1.25), (-0.1, 0.1)) if is_kept else ((0.1, 1.1), (-0.1, 1.0), (1e-20, 1.0))
     )
     return one_of(
-        ask(draw, {**CAP, "r": legs([[begin, 1.0], [(begin + end) / 2, 1.125], [end, 1.0]])}), is_kept
+        ask(draw, {**CAP, "r": legs([[begin, 1.0], [(begin + end) / 2, 1.125], [end, 1.0]])}),
+        is_kept,
     )
 
 

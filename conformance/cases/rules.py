@@ -1,11 +1,12 @@
-"""Good and bad questions for each rule of the protocol (`scene.protocol.rules`), drawn from a seeded stream.
+"""Good and bad questions for each rule of the protocol (`scene.protocol.rules`).
 
-`sample(name, key, is_kept)` returns a question that keeps a rule, close to its limit where it has one, or one
-that breaks this rule and no other. What passes as its answer follows from the rule's duty and from
-`RuleCase.as_read`. A rule about answers gets an answer to a good question instead (`RuleCase.answer`).
+`sample(name, key, is_kept)` returns a question that keeps a rule, close to its limit where it has
+one, or one that breaks this rule and no other. What passes as its answer follows from the rule's
+duty and from `RuleCase.as_read`. A rule about answers gets an answer to a good question instead
+(`RuleCase.answer`).
 
-To draw a new rule, write a function of its name with hyphens as underscores, (draw, is_kept) -> RuleCase:
-in `rule_scenes` for a scene or a law, else here.
+To draw a new rule, write a function of its name with hyphens as underscores, (draw, is_kept) ->
+RuleCase: in `rule_scenes` for a scene or a law, else here.
 """
 
 import json
@@ -86,7 +87,9 @@ def own_wall(draw: Draw, is_kept: bool) -> RuleCase:
     return RuleCase({**request, "state": {**request["state"], "wall": draw.pick(walls)}}, None)
 
 
-def _leaving(draw: Draw, off: float, lift: float, name: bool = True, walls: tuple[Wall, ...] = ()) -> Data:
+def _leaving(
+    draw: Draw, off: float, lift: float, name: bool = True, walls: tuple[Wall, ...] = ()
+) -> Data:
     """Ask for a start on a wall of a drawn scene.
 
     Args:
@@ -105,11 +108,21 @@ def _leaving(draw: Draw, off: float, lift: float, name: bool = True, walls: tupl
     x, y = scenes.point(at, wall, draw.between(0.3, 0.7), draw.between(0.3, 0.7))
     nx, ny = at.normal(wall, x, y)
     by = off * _size(at, wall, x)
-    x, y = (x + by, y) if wall == "left" else (x - by, y) if wall == "right" else (x + by * nx, y + by * ny)
-    away, along = lift - at.receding(wall, y), draw.pick((1.0, -1.0))
+    x, y = (
+        (x + by, y)
+        if wall == "left"
+        else (x - by, y)
+        if wall == "right"
+        else (x + by * nx, y + by * ny)
+    )
+    away = lift - at.receding(wall, y)
+    along = draw.pick((1.0, -1.0))
     state = State(t, x, y, away * nx - along * ny, away * ny + along * nx, wall if name else None)
     return ask(
-        draw, wire_form(of), {field: getattr(state, field) for field in State.__struct_fields__}, 2.0**-20
+        draw,
+        wire_form(of),
+        {field: getattr(state, field) for field in State.__struct_fields__},
+        2.0**-20,
     )
 
 
@@ -117,19 +130,24 @@ def _size(at: TableAt, wall: Wall, x: float) -> float:
     """Return the size of a wall, as docs/protocol.md has it."""
     if wall in ("left", "right"):
         return max(float(at.w), abs(x))
-    return float(at.h) if wall == "floor" else float(at.r) if wall == "arc" else float(max(at.r, at.w))
+    return (
+        float(at.h) if wall == "floor" else float(at.r) if wall == "arc" else float(max(at.r, at.w))
+    )
 
 
 @rule
 def inside(draw: Draw, is_kept: bool) -> RuleCase:
-    """Start inside of a wall or beyond it, off it by 2^-18 to 2^-5 of its size, and at rest as it sees it."""
+    """Start inside of a wall or beyond it.
+
+    It is off the wall by 2^-18 to 2^-5 of its size, and at rest as the wall sees it.
+    """
     off = draw.power(-18, -5) * (1.0 if is_kept else -1.0)
     return one_of(_leaving(draw, off, draw.pick((1.0, 0.5)), name=False), is_kept)
 
 
 @rule
 def on_its_wall(draw: Draw, is_kept: bool) -> RuleCase:
-    """Start off the wall that is named, by at most half of what is allowed, or by twice as much or more."""
+    """Start off the wall that is named, by at most half or at least twice what is allowed."""
     off = (draw.power(-30, -22) if is_kept else draw.power(-18, -6)) * draw.pick((1.0, -1.0))
     return one_of(_leaving(draw, off, 1.0), is_kept)
 
@@ -137,10 +155,12 @@ def on_its_wall(draw: Draw, is_kept: bool) -> RuleCase:
 @rule
 def before_its_end(draw: Draw, is_kept: bool) -> RuleCase:
     """Start on the arc above y = 0 or below, or on a side below y = 0 or above."""
-    past, side = draw.power(-10, -4), draw.pick((1.0, -1.0))
+    past = draw.power(-10, -4)
+    side = draw.pick((1.0, -1.0))
     turn = past if is_kept else -past
     if draw.pick((False, True)):
-        x, y = side * math.cos(turn), math.sin(turn)
+        x = side * math.cos(turn)
+        y = math.sin(turn)
         state = {"t": 0.0, "x": x, "y": y, "vx": -side, "vy": 0.125, "wall": "arc"}
     else:
         wall = "right" if side > 0 else "left"
@@ -167,7 +187,8 @@ CORNERS: tuple[tuple[Data, float, float, tuple[Wall | None, ...]], ...] = (
 def _corner(draw: Draw) -> Data:
     scene, x, y, walls = draw.pick(CORNERS)
     vx, vy = draw.direction()
-    wall, side = draw.pick(walls), draw.pick((1.0, -1.0))
+    wall = draw.pick(walls)
+    side = draw.pick((1.0, -1.0))
     wall = "left" if wall == "right" and side < 0 else wall
     return ask(draw, scene, {"t": 0.0, "x": side * x, "y": y, "vx": vx, "vy": vy, "wall": wall})
 
@@ -194,7 +215,14 @@ ALONG: tuple[tuple[Data, float, float, Wall, float, float], ...] = (
 def _along(draw: Draw) -> Data:
     scene, x, y, wall, vx, vy = draw.pick(ALONG)
     way = draw.pick((1.0, -1.0)) * draw.power(-10, 10)
-    state = {"t": draw.pick((0.0, -2.5, 7.0)), "x": x, "y": y, "vx": way * vx, "vy": way * vy, "wall": wall}
+    state = {
+        "t": draw.pick((0.0, -2.5, 7.0)),
+        "x": x,
+        "y": y,
+        "vx": way * vx,
+        "vy": way * vy,
+        "wall": wall,
+    }
     return ask(draw, scene, state)
 
 
@@ -206,11 +234,17 @@ def lifts_off(draw: Draw, is_kept: bool) -> RuleCase:
 
 @rule
 def early(draw: Draw, is_kept: bool) -> RuleCase:
-    """Start one ulp before or at 2^30 periods, or up to 2^10 times as far, on either side of time 0."""
+    """Start one ulp before or at 2^30 periods, or up to 2^10 times as far.
+
+    Times are on either side of time 0.
+    """
     laws = (1.0, wave(draw), legs([[0.0, 1.0], [0.5, 1.25], [1.5, 1.0]]))
     scene = {**CAP, "r": draw.pick(laws)}
-    shared = period(of := from_data(scene))
-    bound = LATE * (1.0 if shared is None else float(shared.length or 2 * math.pi / (shared.omega or 1.0)))
+    of = from_data(scene)
+    shared = period(of)
+    bound = LATE * (
+        1.0 if shared is None else float(shared.length or 2 * math.pi / (shared.omega or 1.0))
+    )
     while is_late(of, bound):
         bound = math.nextafter(bound, 0.0)
     while not is_late(of, math.nextafter(bound, math.inf)):
@@ -225,7 +259,14 @@ def early(draw: Draw, is_kept: bool) -> RuleCase:
 def small(draw: Draw, is_kept: bool) -> RuleCase:
     """Move at a speed just below 1e100, or at 1e100 or more."""
     speed = math.nextafter(1e100, 0.0) if is_kept else draw.pick((1e100, 1e101, 1e150))
-    state = {"t": 0.0, "x": 0.125, "y": 0.25, "vx": draw.pick((1.0, -1.0)) * speed, "vy": 1.0, "wall": None}
+    state = {
+        "t": 0.0,
+        "x": 0.125,
+        "y": 0.25,
+        "vx": draw.pick((1.0, -1.0)) * speed,
+        "vy": 1.0,
+        "wall": None,
+    }
     return good(ask(draw, _any_cap(draw), state, 2.0**-600))
 
 
@@ -247,15 +288,19 @@ def known_state_fields(draw: Draw, is_kept: bool) -> RuleCase:
 def known_command(draw: Draw, is_kept: bool) -> RuleCase:
     """Give a command, or a word that is none."""
     request = ask(draw, any_table(draw))
-    return one_of(request if is_kept else {**request, "cmd": draw.pick(("dance", "Step", ""))}, is_kept)
+    return one_of(
+        request if is_kept else {**request, "cmd": draw.pick(("dance", "Step", ""))}, is_kept
+    )
 
 
 @rule
 def whole_request(draw: Draw, is_kept: bool) -> RuleCase:
     """Give all fields, or leave one out."""
-    request, gone = ask(draw, any_table(draw)), draw.pick(("scene", "state", "t_end"))
+    request = ask(draw, any_table(draw))
+    gone = draw.pick(("scene", "state", "t_end"))
     return one_of(
-        request if is_kept else {name: part for name, part in request.items() if name != gone}, is_kept
+        request if is_kept else {name: part for name, part in request.items() if name != gone},
+        is_kept,
     )
 
 
@@ -285,14 +330,19 @@ def finite(draw: Draw, is_kept: bool) -> RuleCase:
     if place == "t_end":
         return RuleCase({**request, "t_end": math.inf}, None)
     part = "scene" if place == "r" else "state"
-    return RuleCase({**request, part: {**request[part], place: draw.pick((math.inf, -math.inf))}}, None)
+    return RuleCase(
+        {**request, part: {**request[part], place: draw.pick((math.inf, -math.inf))}}, None
+    )
 
 
 @rule
 def sequence(draw: Draw, is_kept: bool) -> RuleCase:
     """Number a request by a whole number within bounds, or not."""
-    good, bad = (0, 1, MAX_SEQ), (-1, 2.5, "1", None, True, MAX_SEQ + 2)
-    return one_of({**ask(draw, any_table(draw)), "seq": draw.pick(good if is_kept else bad)}, is_kept)
+    good = (0, 1, MAX_SEQ)
+    bad = (-1, 2.5, "1", None, True, MAX_SEQ + 2)
+    return one_of(
+        {**ask(draw, any_table(draw)), "seq": draw.pick(good if is_kept else bad)}, is_kept
+    )
 
 
 @rule
@@ -302,7 +352,11 @@ def counts(draw: Draw, is_kept: bool) -> RuleCase:
     others: tuple[Any, ...] = (-1, 1.5, "1", None, True)
     bad = draw.pick(others)
     if draw.pick((False, True)):
-        path = {**request, "cmd": "trajectory", "collisions": draw.pick((0, 1, 3)) if is_kept else bad}
+        path = {
+            **request,
+            "cmd": "trajectory",
+            "collisions": draw.pick((0, 1, 3)) if is_kept else bad,
+        }
         return one_of(path, is_kept)
     timed = {name: part for name, part in request.items() if name != "t_end"} | {"cmd": "time"}
     numbers: Data = {"collisions": draw.pick((1, 3)), "repeat": draw.pick((1, 2))}
@@ -319,13 +373,17 @@ def end_not_before(draw: Draw, is_kept: bool) -> RuleCase:
     later = math.nextafter(t, math.inf)
     before = draw.pick((math.nextafter(t, -math.inf), t - 5e-7, t - 1.0))
     return one_of(
-        {**request, "state": {**request["state"], "t": t}, "t_end": later if is_kept else before}, is_kept
+        {**request, "state": {**request["state"], "t": t}, "t_end": later if is_kept else before},
+        is_kept,
     )
 
 
 @rule
 def time_left(draw: Draw, is_kept: bool) -> RuleCase:
-    """End after the start, or at the start: inside, on a wall, along one, where two meet, in the mouth."""
+    """End after the start, or at the start.
+
+    It is inside, on a wall, along one, where two meet, or in the mouth.
+    """
     kind = draw.pick(("inside", "on a wall", "along a wall", "corner", "mouth", "early"))
     if is_kept or kind == "inside":
         request = ask(draw, any_table(draw))
@@ -333,7 +391,9 @@ def time_left(draw: Draw, is_kept: bool) -> RuleCase:
         request = _leaving(draw, 0.0, draw.power(-12, 0))
     elif kind == "mouth":
         vx, vy = draw.pick(((1.0, 1.0), (1.0, -1.0), (1.0, 0.0), (0.0, 0.0)))
-        request = ask(draw, MUSHROOM, {"t": 0.0, "x": 0.25, "y": 0.0, "vx": vx, "vy": vy, "wall": None})
+        request = ask(
+            draw, MUSHROOM, {"t": 0.0, "x": 0.25, "y": 0.0, "vx": vx, "vy": vy, "wall": None}
+        )
     elif kind == "early":
         request = early(draw, True).request
     else:
@@ -363,18 +423,23 @@ def fields_once(draw: Draw, is_kept: bool) -> RuleCase:
 
 
 def _answered(draw: Draw, is_kept: bool, good: str, bad: tuple[tuple[str, str], ...]) -> RuleCase:
-    """Return a particle at rest, and an answer: the right one, or with one text replaced by another."""
+    """Return a particle at rest, and its right answer or one with a text replaced."""
     state = {"t": 0.0, "x": 0.125, "y": 0.25, "vx": 0.0, "vy": 0.0, "wall": None}
     request = ask(draw, CAP, state, BRIEF)
     own = '"outcome":"horizon","t":TEND,"x":0.125,"y":0.25,"vx":0.0,"vy":0.0'
-    text = ("{" + f'"seq":{request["seq"]},' + own + good + "}").replace("TEND", repr(request["t_end"]))
+    text = ("{" + f'"seq":{request["seq"]},' + own + good + "}").replace(
+        "TEND", repr(request["t_end"])
+    )
     old, new = draw.pick(bad)
     return RuleCase(request, request, answer=text if is_kept else text.replace(old, new, 1))
 
 
 @rule
 def answer_fields_once(draw: Draw, is_kept: bool) -> RuleCase:
-    """Answer with each field once, or with one twice: known or unknown, with equal values or not."""
+    """Answer with each field once, or with one twice.
+
+    The field is known or unknown, its two values equal or not.
+    """
     twice = (
         ('"vy":0.0', '"vy":0.0,"vy":0.0'),
         ('"vy":0.0', '"vy":1.0,"vy":0.0'),
@@ -389,7 +454,9 @@ def answer_fields_once(draw: Draw, is_kept: bool) -> RuleCase:
 @rule
 def same_seq(draw: Draw, is_kept: bool) -> RuleCase:
     """Answer with the number of the request, or another."""
-    return _answered(draw, is_kept, "", (('"seq":', '"seq":1'), ('"seq":', '"seq":-'), ('"seq":', '"SEQ":')))
+    return _answered(
+        draw, is_kept, "", (('"seq":', '"seq":1'), ('"seq":', '"seq":-'), ('"seq":', '"SEQ":'))
+    )
 
 
 @rule

@@ -1,15 +1,15 @@
 """Scenes drawn at random, and where, when and how fast a particle starts in them.
 
-Laws lie inside nested ranges, which makes every scene valid. To prove that a slope of many harmonics closes
-no stem takes up to some ten seconds, so ranges are nested there too. A deep wave is a Fourier law whose
-amplitudes add up to more than its mean, and which is positive all the same.
+Laws lie inside nested ranges, which makes every scene valid. To prove that a slope of many
+harmonics closes no stem takes up to some ten seconds, so ranges are nested there too. A deep wave
+is a Fourier law whose amplitudes add up to more than its mean, and which is positive all the same.
 
-`law`, `scene`, `time`, `place` and `state` are what the corpus is drawn with: their streams never change.
-`any_law`, `any_scene` and `start` go on from there: laws of every shape and length that begin anywhere, deep
-stems and shallow ones, narrow mouths, slopes as steep as these allow; late times and early ones, places near
-walls, corners and edges, or off their wall by what is allowed, the directions that formulas divide by. A
-state may still be refused (its rounded place lies outside, or it moves into the wall it names): the caller
-draws again.
+`law`, `scene`, `time`, `place` and `state` are what the corpus is drawn with: their streams never
+change. `any_law`, `any_scene` and `start` go on from there: laws of every shape and length that
+begin anywhere, deep stems and shallow ones, narrow mouths, slopes as steep as these allow; late
+times and early ones, places near walls, corners and edges, or off their wall by what is allowed,
+the directions that formulas divide by. A state may still be refused (its rounded place lies
+outside, or it moves into the wall it names): the caller draws again.
 """
 
 import math
@@ -23,7 +23,7 @@ from scene import (
     BangBang,
     Cap,
     Fourier,
-    Law,
+    GivenLaw,
     Mushroom,
     Scene,
     State,
@@ -49,17 +49,22 @@ FAINT = 8, 20, 30  # powers of a half that what a law moves by is multiplied wit
 DEEPER = 0, 0, 0, 3, 5, -3, -5, -10  # powers of two that a stem's depth is multiplied with
 NARROWER = 0, 0, -4, -8, -20  # likewise, a mouth's width
 LONGEST = 8.0  # periods of one flight
-# Periods before a late start, or from it to time 0, as powers of two. Later ones a stepper may refuse: of
-# sixteen waves the last is 2^24 of its own periods late by then, and much of a phase is lost.
+# Periods before a late start, or from it to time 0, as powers of two. Later ones a stepper may
+# refuse: of sixteen waves the last is 2^24 of its own periods late by then, and much of a phase is
+# lost.
 LATE = 9, 20
-REACH = {"arc": "r", "floor": "h"}  # the law that says how large a wall is; that of a side is its width
+# The law that says how large a wall is; that of a side is its width.
+REACH = {
+    "arc": "r",
+    "floor": "h",
+}
 
 
 class Clock(NamedTuple):
     """What the moving laws of a scene share: kind, and omega or the period.
 
-    Of kind "mixed" each law is of its own kind, and of "harmonics" a Fourier law of four to sixteen; both
-    share a period.
+    Of kind "mixed" each law is of its own kind, and of "harmonics" a Fourier law of four to
+    sixteen; both share a period.
     """
 
     kind: str
@@ -72,11 +77,15 @@ def clock(draw: Draw, kinds: Sequence[str] = ("fourier", "bang-bang", "constant"
     return Clock(kind, draw.short(0.5, 6.0) if kind == "fourier" else draw.pick(PERIODS))
 
 
-def law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
+def law(draw: Draw, low: float, high: float, shared: Clock) -> GivenLaw:
     """Draw a law that stays within [low, high]; now and then one that stands still."""
     if shared.kind == "mixed":
-        found = law(draw, low, high, shared._replace(kind=draw.pick(("fourier", "bang-bang", "constant"))))
-        return replace(found, omega=None, period=shared.rate) if isinstance(found, Fourier) else found
+        found = law(
+            draw, low, high, shared._replace(kind=draw.pick(("fourier", "bang-bang", "constant")))
+        )
+        return (
+            replace(found, omega=None, period=shared.rate) if isinstance(found, Fourier) else found
+        )
     if shared.kind == "constant" or draw.pick(range(6)) == 0:
         return draw.short(low, high)
     if shared.kind == "bang-bang":
@@ -89,7 +98,8 @@ def law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
     n_cos, n_sin = draw.pick(MANY_HARMONICS if shared.kind == "harmonics" else FEW_HARMONICS)
     size = 0.999 * min(high - mean, mean - low) / (n_cos + n_sin)
     amplitudes = [draw.short(-size, size) for _ in range(n_cos + n_sin)]
-    cos, sin = tuple(amplitudes[:n_cos]), tuple(amplitudes[n_cos:])
+    cos = tuple(amplitudes[:n_cos])
+    sin = tuple(amplitudes[n_cos:])
     if shared.kind == "harmonics":
         return Fourier(mean=mean, period=shared.rate, cos=cos, sin=sin)
     return Fourier(mean=mean, omega=shared.rate, cos=cos, sin=sin)
@@ -105,13 +115,16 @@ def deep_wave(draw: Draw, low: float, high: float, omega: float) -> Fourier:
 
 
 def _square(low: float, high: float, a: float, b: float, omega: float) -> Fourier:
-    """Return a law in [low, high]: low and a share of |1 + a e^ix + b e^2ix|^2, which is never negative."""
+    """Return a law in [low, high].
+
+    It is low and a share of |1 + a e^ix + b e^2ix|^2, which is never negative.
+    """
     unit = (high - low) / (1 + abs(a) + b) ** 2
     waves = (2 * a * (1 + b) * unit, 2 * b * unit)
     return Fourier(mean=low + (1 + a * a + b * b) * unit, omega=omega, cos=waves)
 
 
-LawDraw = Callable[[Draw, float, float, Clock], Law]
+LawDraw = Callable[[Draw, float, float, Clock], GivenLaw]
 
 
 def scene(draw: Draw, table: str, shared: Clock, law: LawDraw = law) -> Scene:
@@ -130,10 +143,12 @@ def scene(draw: Draw, table: str, shared: Clock, law: LawDraw = law) -> Scene:
     if narrowest <= 0:  # of a deep wave no more is known: a mouth as wide might not fit
         raise Unfit("the cap may vanish")
     w = law(draw, narrowest / 4, narrowest * 0.99, shared)
-    return Mushroom(r=r, w=w, h=h, slope=_slope(draw, bounds(w).lowest, bounds(h).highest, shared, law))
+    return Mushroom(
+        r=r, w=w, h=h, slope=_slope(draw, bounds(w).lowest, bounds(h).highest, shared, law)
+    )
 
 
-def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock, law: LawDraw) -> Law:
+def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock, law: LawDraw) -> GivenLaw:
     steepest = 0.9 * narrowest / deepest
     kind = draw.pick(("positive", "zero", "negative", "moving"))
     if kind == "moving" and steepest > 0.01:
@@ -143,13 +158,15 @@ def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock, law: Law
     return draw.short(-0.8, -0.01) if kind == "negative" else 0.0
 
 
-def any_law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
+def any_law(draw: Draw, low: float, high: float, shared: Clock) -> GivenLaw:
     """Draw a law within [low, high], in any shape that it may have.
 
-    A constant may be written as a law that moves by nothing, with a period that no other has; a wave may sink
-    nearly to 0; a law may hardly move; one of legs begins anywhere, and may have as many as there may be.
+    A constant may be written as a law that moves by nothing, with a period that no other has; a
+    wave may sink nearly to 0; a law may hardly move; one of legs begins anywhere, and may have as
+    many as there may be.
     """
-    found, way = law(draw, low, high, shared), draw.pick((0, 1, 2, 3, 4))
+    found = law(draw, low, high, shared)
+    way = draw.pick((0, 1, 2, 3, 4))
     if isinstance(found, float) and way == 4:
         return Fourier(mean=found, omega=draw.short(0.5, 6.0), cos=(0.0,))
     if isinstance(found, float):
@@ -175,7 +192,8 @@ def _faint(of: Fourier | BangBang, part: float) -> Fourier | BangBang:
 
 def many_legs(draw: Draw, low: float, high: float, period: float, n: int | None = None) -> BangBang:
     """Draw a law of n legs, or of many."""
-    n, places = n or draw.pick(LEGS), set[int]()
+    n = n or draw.pick(LEGS)
+    places = set[int]()
     while len(places) < n - 1:
         places.add(draw.pick(range(1, GRID)))
     times = [0.0, *(period * place / GRID for place in sorted(places)), period]
@@ -194,9 +212,12 @@ def any_scene(draw: Draw, table: str | None = None, kinds: Sequence[str] = KINDS
     found = scene(draw, table or draw.pick((*TABLES, "mushroom")), clock(draw, kinds), any_law)
     if not isinstance(found, Cap):
         mouth = "w" if "w" in laws(found) else "nu"
-        deeper, wider = draw.pick(DEEPER), draw.pick(NARROWER)
+        deeper = draw.pick(DEEPER)
+        wider = draw.pick(NARROWER)
         powers = {mouth: wider, "h": deeper, "slope": wider - deeper}
-        found = replace(found, **{name: scaled_law(getattr(found, name), n, 0) for name, n in powers.items()})
+        found = replace(
+            found, **{name: scaled_law(getattr(found, name), n, 0) for name, n in powers.items()}
+        )
     return replace(found, name=draw.pick(("", "", "scene", "1")))
 
 
@@ -243,9 +264,10 @@ def state(draw: Draw, scene: Scene, at: dict[str, Any]) -> tuple[State, float]:
     Args:
         draw: stream of numbers.
         scene: a valid scene.
-        at: what is fixed: `t`, `site`, `speed` (a factor of the walls' speed, or of the table's size per
-            unit of time when nothing moves), `lift` (sine of the angle at which a wall is left, relative
-            to the wall), `patience` (flight time allowed, in crossings of the table).
+        at: what is fixed: `t`, `site`, `speed` (a factor of the walls' speed, or of the table's
+            size per unit of time when nothing moves), `lift` (sine of the angle at which a wall is
+            left, relative to the wall), `patience` (flight time allowed, in crossings of the
+            table).
     """
     t = at["t"] if "t" in at else time(draw, scene)
     table = rounded(scene, t)
@@ -260,7 +282,8 @@ def state(draw: Draw, scene: Scene, at: dict[str, Any]) -> tuple[State, float]:
         lift = at.get("lift") or draw.part()
         along = draw.pick((1.0, -1.0)) * speed
         away = lift * speed - table.receding(wall, y)
-        vx, vy = away * nx - along * ny, away * ny + along * nx
+        vx = away * nx - along * ny
+        vy = away * ny + along * nx
     t_end = t + at.get("patience", 64.0) * table.size / speed
     return State(t, x, y, vx, vy, wall), t_end
 
@@ -283,7 +306,8 @@ def start(draw: Draw, scene: Scene, t: float, site: str | None = None) -> tuple[
         t: time of the start [time].
         site: a region or a wall; any by default.
     """
-    length, table = scene.period or 1.0, rounded(scene, t)
+    length = scene.period or 1.0
+    table = rounded(scene, t)
     site = site or draw.pick(sites(scene))
     x, y = point(table, site, draw.near_an_end(), draw.near_an_end())
     usual = draw.pick((walls_speed(scene) or table.size, table.size / length))
@@ -293,15 +317,21 @@ def start(draw: Draw, scene: Scene, t: float, site: str | None = None) -> tuple[
     wall: Wall | None = next((name for name in scene.walls if name == site), None)
     if wall is None:
         return State(t, x, y, vx, vy), t_end
-    if wall == "base" and isinstance(scene, Mushroom) and draw.pick((False, True)):  # where it is open now
+    if (
+        wall == "base" and isinstance(scene, Mushroom) and draw.pick((False, True))
+    ):  # where it is open now
         return State(t, draw.between(-0.99, 0.99) * table.w, 0.0, vx, abs(vy), wall), t_end
     leaving = _leaving(draw, table, State(t, x, y, vx, vy, wall))
     return off_its_wall(draw, scene, leaving) if draw.pick(range(4)) == 3 else leaving, t_end
 
 
 def _velocity(draw: Draw, x: float, y: float, speed: float) -> tuple[float, float]:
-    """Draw a velocity of some speed: any, along an axis, and to the centre, from it or around it exactly."""
-    way, distance = draw.pick(range(8)), math.sqrt(x * x + y * y)
+    """Draw a velocity of some speed.
+
+    Its direction is any, along an axis, or exactly to, from or around the centre.
+    """
+    way = draw.pick(range(8))
+    distance = math.sqrt(x * x + y * y)
     if way == 1 and distance > 0:
         part = 2.0 ** math.frexp(speed / distance)[1]
         return draw.pick(((-part * x, -part * y), (part * x, part * y), (-part * y, part * x)))
@@ -312,7 +342,10 @@ def _velocity(draw: Draw, x: float, y: float, speed: float) -> tuple[float, floa
 
 
 def _leaving(draw: Draw, table: TableAt, state: State) -> State:
-    """Return a state that leaves its wall: as it is, if it does, reflected if not, or grazing the wall."""
+    """Return a state that leaves its wall.
+
+    It is as it was if it does, else reflected, or grazing the wall.
+    """
     assert state.wall is not None
     nx, ny = table.normal(state.wall, state.x, state.y)
     away = state.vx * nx + state.vy * ny + table.receding(state.wall, state.y)
@@ -325,7 +358,8 @@ def _leaving(draw: Draw, table: TableAt, state: State) -> State:
 def point(at: TableAt, site: str, a: float, b: float) -> tuple[float, float]:
     """Place two parts, from 0 to 1, of a region, or one of a wall; (1/2, 1/2) is its middle."""
     if site in ("cap", "arc"):
-        p, rho = 2 * a - 1, at.r if site == "arc" else at.r * b
+        p = 2 * a - 1
+        rho = at.r if site == "arc" else at.r * b
         return rho * 2 * p / (1 + p * p), rho * (1 - p * p) / (1 + p * p)
     if site == "base" and not isinstance(at.scene, Stem):
         return math.copysign(at.w + (at.r - at.w) * b, a - 0.5), 0.0
@@ -333,7 +367,7 @@ def point(at: TableAt, site: str, a: float, b: float) -> tuple[float, float]:
 
 
 def off_its_wall(draw: Draw, scene: Scene, state: State, least: int = -9) -> State:
-    """Return a start farther from its wall than rounding leads, on either side, and on it by definition.
+    """Return a start on its wall by definition, farther from it than rounding leads.
 
     Args:
         draw: stream of numbers.

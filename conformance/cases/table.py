@@ -4,5 +4,7 @@ from conformance.cases import delicate_families, run_families
 from conformance.cases.draw import Family
 
 FAMILIES: dict[str, Family] = {
-    family.name: family for module in (run_families, delicate_families) for family in module.FAMILIES
+    family.name: family
+    for module in (run_families, delicate_families)
+    for family in module.FAMILIES
 }

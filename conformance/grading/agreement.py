@@ -1,36 +1,44 @@
-"""Does an answer agree with a certified one? One comparison, for grades, benchmark, attacks and tests.
+"""Does an answer agree with a certified one? One comparison, for all who grade.
 
-An agreement is the same outcome, the same walls in the same order, and numbers that are right as physics:
-a backward error of at most 1e-9, |out - truth| / (allowance + |out|). Place and velocity are each taken as a
-vector (its largest allowance and component), so that a stepper which computes normals from angles is not
-refused for 1e-17 where the exact zero is right. A caller may also bound the backward ulps of every single
-component. In a trajectory all steps are held to the same bounds, with chained allowances.
+An agreement is the same outcome, the same walls in the same order, and numbers that are right as
+physics: a backward error of at most 1e-9, |out - truth| / (allowance + |out|). Place and velocity
+are each taken as a vector (its largest allowance and component), so that a stepper which computes
+normals from angles is not refused for 1e-17 where the exact zero is right. A caller may also bound
+the backward ulps of every single component. In a trajectory all steps are held to the same bounds,
+with chained allowances.
 
 The one measure of precision is backward ulps:
 
     |out - truth| / (sum over inputs |d out / d in| |in| u + |out| u),    u = 2^-53
 
-counts how many units in the last place the inputs and the output would have to move to explain the answer.
-It is as fair to a grazing hit, where every stepper must lose digits, as to a head-on one. The sum over the
-inputs is the `allowance` that a certified answer carries (`conformance.vectors.Certified`).
+counts how many units in the last place the inputs and the output would have to move to explain the
+answer. It is as fair to a grazing hit, where every stepper must lose digits, as to a head-on one.
+The sum over the inputs is the `allowance` that a certified answer carries
+(`conformance.vectors.Certified`).
 
-Both the truth and the answer may be enclosures. Numbers count as right, or as wrong, only where they are so
-for all numbers of the enclosures; else the comparison is `indeterminate`. An answer `undecided` is never
-wrong; callers count it. The reason of an undefined outcome must be the certified one; no other is compared.
+Both the truth and the answer may be enclosures. Numbers count as right, or as wrong, only where
+they are so for all numbers of the enclosures; else the comparison is `indeterminate`. An answer
+`undecided` is never wrong; callers count it. The reason of an undefined outcome must be the
+certified one; no other is compared.
 
-The verdict on an answer (`grade`) keeps physics apart from precision. Physics asks for agreement, with less
-than 1e-9 where the condition number is above 1e6 (`physics_bound`). Where the enclosures of the truth are too
-wide to tell, the verdict is `indeterminate`, which is the corpus's defect. Trajectories end before the
-condition number reaches 1e8; only hard case 30 goes on, where the walls are the question.
+The verdict on an answer (`grade`) keeps physics apart from precision. Physics asks for agreement,
+with less than 1e-9 where the condition number is above 1e6 (`physics_bound`). Where the enclosures
+of the truth are too wide to tell, the verdict is `indeterminate`, which is the corpus's defect.
+Trajectories end before the condition number reaches 1e8; only hard case 30 goes on, where the walls
+are the question.
 
-- `undecided` where an answer is due is `declined`; so is a trajectory that ends so, after right steps.
-- Where a vector allows `rejected` beside an answer (a time so late, numbers so large), `undecided` will do.
-- Where the mathematics gives no answer (`undefined`), `undecided` is right too, and listed in the vector.
-- `rejected` for a valid question is `fail`: what an implementation cannot do it says in its introduction,
-  and is then not asked (`unsupported`, the runner's verdict, as `crashed` and `timed-out` are).
-- An answer {"error": "..."} is `error`; missing or ill-typed fields are `wrong-format`, and so are numbers
-  that are none (JSON has no nan). Further fields are ignored. The reason of `undefined` is compared, others
-  are not.
+- `undecided` where an answer is due is `declined`; so is a trajectory that ends so, after right
+  steps.
+- Where a vector allows `rejected` beside an answer (a time so late, numbers so large), `undecided`
+  will do.
+- Where the mathematics gives no answer (`undefined`), `undecided` is right too, and listed in the
+  vector.
+- `rejected` for a valid question is `fail`: what an implementation cannot do it says in its
+  introduction, and is then not asked (`unsupported`, the runner's verdict, as `crashed` and
+  `timed-out` are).
+- An answer {"error": "..."} is `error`; missing or ill-typed fields are `wrong-format`, and so are
+  numbers that are none (JSON has no nan). Further fields are ignored. The reason of `undefined` is
+  compared, others are not.
 """
 
 import math
@@ -48,14 +56,16 @@ from scene.protocol.rules import does_undecided_pass
 U = Fraction(1, 2**53)
 LEAST = Fraction(1, 2**1075)  # half the spacing of subnormal numbers: nothing rounds better
 BOUND = Fraction(1, 10**9)  # physics: far above rounding, far below any error of principle
-DIGITS, SHARPEST = Fraction(1, 1000), Fraction(1, 2**43)  # what passes is right to; a thousand backward ulps
+DIGITS = Fraction(1, 1000)  # what passes is right to
+SHARPEST = Fraction(1, 2**43)  # a thousand backward ulps
 NEAR_HIT = Fraction(1, 10)  # of the flight time
 # dt, t, place, velocity: what is judged as one vector.
 VECTORS = (("dt",), ("t",), ("x", "y"), ("vx", "vy"))
 PrecisionClass = Literal["A", "B", "C"]
 FORMS: dict[str, Any] = {"step": Answered, "trajectory": Steps, "flow": Flown}
 LOST = ("undefined", "undecided", "rejected")  # may be answered to a whole question
-SHARP, FAIR = 4.0, 1e4  # backward ulps of classes A and B
+SHARP = 4.0  # backward ulps of class A
+FAIR = 1e4  # and of class B
 # Of several right answers the best grade counts; this is the order.
 _PREFERENCE = ("pass", "indeterminate", "declined", "fail")
 Verdict = Literal["pass", "fail", "indeterminate", "declined", "error", "wrong-format"]
@@ -85,9 +95,9 @@ class Agreement(NamedTuple):
     """How an answer compares.
 
     Attributes:
-        verdict: `pass`, or `fail` where an outcome, a wall, a number or the length of a trajectory differs;
-            `declined` where the answer is undecided; `indeterminate` where the truth cannot tell; `error` or
-            `wrong-format` where nothing was compared (`grade`).
+        verdict: `pass`, or `fail` where an outcome, a wall, a number or the length of a trajectory
+            differs; `declined` where the answer is undecided; `indeterminate` where the truth
+            cannot tell; `error` or `wrong-format` where nothing was compared (`grade`).
         ulps: worst backward ulps of a component, nan when not measured.
         relative: worst backward error, likewise.
         why: one line.
@@ -112,17 +122,21 @@ class _Error(NamedTuple):
 
 
 def backward_ulps(error: Fraction, size: Fraction) -> Fraction | float:
-    """Return |out - truth| in units of u times a size (allowance plus |out|), inf where only 0 is right."""
+    """Return |out - truth| in units of u times a size (allowance plus |out|).
+
+    It is inf where only 0 is right.
+    """
     if not size:
         return math.inf if error else Fraction(0)
     return error / max(size * U, LEAST)
 
 
 def physics_bound(condition: float) -> Fraction:
-    """Return the backward error that is granted as physics, for a question of some condition number.
+    """Return the backward error that is granted as physics, by the condition number.
 
-    An answer that passes is right to three digits, as long as a thousand backward ulps allow that: 1e-9 up
-    to a condition of 1e6, and 1e-3 / condition beyond. A phase ten billion periods on must not be off by ten.
+    An answer that passes is right to three digits, as long as a thousand backward ulps allow that:
+    1e-9 up to a condition of 1e6, and 1e-3 / condition beyond. A phase ten billion periods on must
+    not be off by ten.
     """
     return min(BOUND, max(DIGITS / Fraction(max(condition, 1.0)), SHARPEST))
 
@@ -139,7 +153,8 @@ def compare(
     """Compare an answer with the truth.
 
     Args:
-        answer: of a step; of a trajectory a list of its steps, with what came instead of a further one.
+        answer: of a step; of a trajectory a list of its steps, with what came instead of a further
+            one.
         expected: certified; None where the proof itself is undecided.
         state: the start.
         bound: backward ulps allowed in every component; None where physics is all that is asked.
@@ -151,24 +166,29 @@ def compare(
     """
     answers = answer if isinstance(answer, list) else [answer]
     if expected is None:
-        is_undecided = any(isinstance(step, Undecided) for step in answers)
-        return Agreement("declined" if is_undecided else "indeterminate", why="the proof is undecided")
-    measured: list[_Error] = []
+        return _without_proof(answers)
     due = list(zip(expected.steps, _times(expected, state), strict=True))[-1 if is_end else 0 :]
+    measured: list[_Error] = []
     for i, (certified, time) in enumerate(due):
         place = f"step {i + 1}: " if isinstance(answer, list) else ""
         if i >= len(answers):
             return Agreement("fail", why=f"{place}missing, {i} of {len(due)} were given", step=i)
-        if differing := _difference(answers[i], certified):
+        differing = _difference(answers[i], certified)
+        if differing:
             return differing._replace(why=(place + differing.why)[:200], step=i)
         errors = _measure(answers[i], certified, time, place)
         measured += errors
-        if any(error.least > physics for error in errors):
-            hint = _missed(answers[i], certified)
+        if max((error.least for error in errors), default=Fraction(0)) > physics:
             judged = _judge_numbers(measured, bound, physics)
-            return judged._replace(why=judged.why + hint, step=i)
+            return judged._replace(why=judged.why + _missed(answers[i], certified), step=i)
     end = _judge_end(expected, answers[len(due) :])
     return end._replace(step=len(due)) if end else _judge_numbers(measured, bound, physics)
+
+
+def _without_proof(answers: list[Answer]) -> Agreement:
+    """Return the verdict where the proof itself is undecided."""
+    is_undecided = any(isinstance(step, Undecided) for step in answers)
+    return Agreement("declined" if is_undecided else "indeterminate", why="the proof is undecided")
 
 
 def compare_arrival(
@@ -188,14 +208,21 @@ def compare_arrival(
         physics: backward error allowed.
 
     Returns:
-        As `compare`; `numbers` too where a stay is missing, invented, or begins or ends at a wrong time.
+        As `compare`; `numbers` too where a stay is missing, invented, or begins or ends at a wrong
+        time.
     """
     judged = compare(answer, expected, state, physics=physics, is_end=True)
     if judged.verdict != "pass" or expected.outcome != "horizon":
         return judged
     if (captured is None) != (not expected.stays):
-        said = "none" if captured is None else f"a capture interval from {captured[0]!r} to {captured[1]!r}"
-        first = f"the capture interval {expected.stays[0]} of its steps" if expected.stays else "none"
+        said = (
+            "none"
+            if captured is None
+            else f"a capture interval from {captured[0]!r} to {captured[1]!r}"
+        )
+        first = (
+            f"the capture interval {expected.stays[0]} of its steps" if expected.stays else "none"
+        )
         return judged._replace(verdict="fail", why=f"captured: {said}, must be {first}")
     if captured is None:
         return judged
@@ -210,7 +237,7 @@ def compare_arrival(
 
 
 def middle(expected: Expectation, state: State) -> list[Outcome]:
-    """Return the certified answer in the middle of its enclosures, rounded to binary64: one outcome a step.
+    """Return the middle of the certified answer, rounded to binary64: one outcome a step.
 
     Args:
         expected: the certified answer.
@@ -244,7 +271,10 @@ def _difference(answer: Answer, certified: Certified) -> Agreement | None:
 
 
 def _missed(answer: Answer, certified: Certified) -> str:
-    """Say what the flight time alone shows of a wrong answer: an earlier hit was missed, or one invented."""
+    """Say what the flight time alone shows of a wrong answer.
+
+    Either an earlier hit was missed, or one was invented.
+    """
     if isinstance(answer, Horizon):
         return ", an earlier hit was missed" if certified.wall else ""
     if (
@@ -267,7 +297,8 @@ def _judge_end(expected: Expectation, rest: Sequence[Answer]) -> Agreement | Non
         return Agreement("fail", why=f"{len(rest)} steps too many") if rest else None
     if not rest:
         return Agreement("fail", why=f"must end as {expected.outcome}")
-    kind, due = _name(rest[0]), f"{expected.outcome} {expected.reason}".rstrip()
+    kind = _name(rest[0])
+    due = f"{expected.outcome} {expected.reason}".rstrip()
     said = f"undefined {rest[0].reason}" if isinstance(rest[0], Undefined) else kind
     if said == due or kind == expected.outcome != "undefined":
         return None
@@ -307,29 +338,41 @@ def _times(expected: Expectation, state: State) -> Iterator[tuple[Ends, Fraction
     allowance = abs(low)
     for certified in expected.steps:
         shortest, longest = certified.ends("dt")
-        low, high = low + shortest, high + longest
+        low = low + shortest
+        high = high + longest
         allowance += Fraction(certified.allowance[0])
         yield (low, high), allowance
 
 
-def _measure(answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str) -> list[_Error]:
-    """Measure dt (of a horizon none is given), t (but of an enclosed answer), place and velocity."""
+def _measure(
+    answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str
+) -> list[_Error]:
+    """Measure dt, t, place and velocity.
+
+    A horizon has no dt, and an enclosed answer no t.
+    """
     numbers = _numbers_of(answer)
-    if not all(math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)):
+    if not all(
+        math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)
+    ):
         return [_Error(f"{place}a number that is not finite", *[math.inf] * 4)]
     answered = {name: (Fraction(low), Fraction(high)) for name, (low, high) in numbers.items()}
     truth = {name: certified.ends(name) for name in NUMBERS} | {"t": time[0]}
-    allowances = dict(zip(NUMBERS, map(Fraction, certified.allowance), strict=True)) | {"t": time[1]}
+    allowances = dict(zip(NUMBERS, map(Fraction, certified.allowance), strict=True)) | {
+        "t": time[1]
+    }
     sizes = {name: allowances[name] + max(map(abs, ends)) for name, ends in answered.items()}
     found = []
     for vector in VECTORS:
         names = [name for name in vector if name in answered]
         scale = max([LEAST / U, *(sizes[name] for name in names)])
         for name in names:
-            (low, high), (certified_low, certified_high) = answered[name], truth[name]
+            low, high = answered[name]
+            certified_low, certified_high = truth[name]
             most = max(abs(high - certified_low), abs(certified_high - low))
             least = max(certified_low - high, low - certified_high, Fraction(0))
-            # An exact zero that nothing can move, as y on the base, has no size of its own to be measured by.
+            # An exact zero that nothing can move, as y on the base, has no size of its own to be
+            # measured by.
             is_zero = not allowances[name] and not any(truth[name])
             size = scale if is_zero else sizes[name]
             ulps = backward_ulps(least, size), backward_ulps(most, size)
@@ -360,7 +403,8 @@ def grade(vector: Vector, answer: Any) -> Agreement:
         answer: what the implementation sent, decoded: a mapping, or the answer is none.
 
     Returns:
-        Its `verdict` is pass, fail, indeterminate, declined, error or wrong-format; with the errors measured.
+        Its `verdict` is pass, fail, indeterminate, declined, error or wrong-format; with the errors
+        measured.
     """
     if isinstance(answer, Mapping) and isinstance(answer.get("error"), str):
         return Agreement("error", why=" ".join(answer["error"].split())[:200])
@@ -369,15 +413,13 @@ def grade(vector: Vector, answer: Any) -> Agreement:
         given = [msgspec.convert(msgspec.to_builtins(part), Answered) for part in parts]
     except (TypeError, msgspec.ValidationError, OverflowError, RecursionError) as error:
         return Agreement("wrong-format", why=" ".join(str(error).split()))
+    graded = min(_compare_all(vector, parts, given), key=lambda one: _PREFERENCE.index(one.verdict))
     physics = physics_bound(vector.condition)
-    if vector.kind == "flow":
-        captured = getattr(parts[0], "captured", None)
-        found = [compare_arrival(given[0], captured, known, vector.state, physics) for known in vector.expect]
-    else:
-        asked: Answer | list[Answer] = given if vector.kind == "trajectory" else given[0]
-        found = [compare(asked, known, vector.state, physics=physics) for known in vector.expect]
-    graded = min(found, key=lambda one: _PREFERENCE.index(one.verdict))
-    if graded.verdict == "pass" and not math.isnan(graded.relative) and vector.condition * physics >= 1:
+    if (
+        graded.verdict == "pass"
+        and not math.isnan(graded.relative)
+        and vector.condition * physics >= 1
+    ):
         none = f"the walls alone are graded: condition {vector.condition:.1g} allows no number"
         graded = graded._replace(why=none)
     outcomes = {known.outcome for known in vector.expect}
@@ -388,8 +430,22 @@ def grade(vector: Vector, answer: Any) -> Agreement:
     return graded
 
 
+def _compare_all(
+    vector: Vector, parts: list[Any], given: Sequence[Answered]
+) -> Iterator[Agreement]:
+    """Compare what was sent with each answer that the vector permits."""
+    physics = physics_bound(vector.condition)
+    for known in vector.expect:
+        if vector.kind == "flow":
+            captured = getattr(parts[0], "captured", None)
+            yield compare_arrival(given[0], captured, known, vector.state, physics)
+        else:
+            asked: Answer | list[Answer] = list(given) if vector.kind == "trajectory" else given[0]
+            yield compare(asked, known, vector.state, physics=physics)
+
+
 def precision_class(ulps: Sequence[float]) -> PrecisionClass:
-    """Return the class reached: A for at most 4 backward ulps in all answers, B for 1e4, C for the rest.
+    """Return the class reached: A for at most 4 backward ulps, B for at most 1e4, else C.
 
     Args:
         ulps: of the answers that passed; nan (nothing measured) is left out.
@@ -399,7 +455,7 @@ def precision_class(ulps: Sequence[float]) -> PrecisionClass:
 
 
 def _parts(vector: Vector, answer: Any) -> list[Any]:
-    """Decode an answer into the outcomes that it is made of, strictly; a whole refusal is the only one.
+    """Decode an answer strictly into its outcomes; a refusal of the whole is the only one.
 
     Raises:
         msgspec.ValidationError: naming the field that is missing or of the wrong type.
@@ -415,7 +471,9 @@ def _parts(vector: Vector, answer: Any) -> list[Any]:
         fields = msgspec.structs.asdict(part)
         numbers = [*fields.values(), *(fields.get("captured") or ())]
         if i < len(parts) - 1 and not isinstance(part, AnsweredCollision):
-            raise msgspec.ValidationError(f"steps[{i}]: only the last may be other than a collision")
+            raise msgspec.ValidationError(
+                f"steps[{i}]: only the last may be other than a collision"
+            )
         if isinstance(part, AnsweredCollision) and part.wall is None:
             raise msgspec.ValidationError("`wall` is missing")
         if not all(math.isfinite(number) for number in numbers if isinstance(number, float)):

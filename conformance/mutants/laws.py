@@ -16,7 +16,7 @@ from conformance.plain.step import (
     LawMotion,
     LawValue,
 )
-from scene import BangBang, Fourier, Law, Outcome, Rejected, Scene, State
+from scene import BangBang, Fourier, GivenLaw, Outcome, Rejected, Scene, State
 from scene.laws import bounds, frequency
 from scene.tables import laws
 
@@ -49,7 +49,7 @@ def half_leg_acceleration_sign(
 
 
 @mutant(Flight, "law")
-def period_wrap_lost(flight: Flight, plain: Plain[LawMotion], law: Law) -> LawMotion:
+def period_wrap_lost(flight: Flight, plain: Plain[LawMotion], law: GivenLaw) -> LawMotion:
     """Lets a bang-bang law stand still outside its first period."""
     if not isinstance(law, BangBang):
         return plain(law)
@@ -137,7 +137,7 @@ def period_for_frequency(motion: FourierMotion, plain: Plain[None], law: Fourier
 
 
 @mutant(Flight, "law")
-def first_period_only(flight: Flight, plain: Plain[LawMotion], law: Law) -> LawMotion:
+def first_period_only(flight: Flight, plain: Plain[LawMotion], law: GivenLaw) -> LawMotion:
     """Lets every law stand still after one period of flight."""
     motion = plain(law)
     if isinstance(law, Fourier):

@@ -28,9 +28,9 @@ from scene import (
     Cap,
     Collision,
     Fourier,
+    GivenLaw,
     Horizon,
     InvalidState,
-    Law,
     Mushroom,
     Outcome,
     Rejected,
@@ -186,7 +186,7 @@ class Flight:
         self.is_horizon = self.end == t_end - state.t
         self.crossing = self.crossing_time()
 
-    def law(self, law: Law) -> LawMotion:
+    def law(self, law: GivenLaw) -> LawMotion:
         """Return a law as seen from departure."""
         found: LawMotion = self.kinds[type(law)](law, self.state.t)
         return found

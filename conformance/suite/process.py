@@ -11,7 +11,7 @@ a process whose parents are gone becomes a child of this one, not of init, howev
 session it opened and whatever it cleared from its environment. So the descendants of a command are those
 below its leader, and those children of this process that are in another session than this process (the
 leader's, or one that they opened: nobody can enter an existing one) and were not there before.
-On other systems only its process group is known.
+On other systems its process group is known, and those below its leader whose parents live.
 
 Not handled: processes of another user (set-user-ID programs), and a family that forks and dies faster than
 it can be listed, which is given up after some seconds. While several commands run at once, orphans
@@ -26,9 +26,10 @@ import selectors
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from pathlib import Path
-from typing import ClassVar, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import ClassVar
+
+import psutil
 
 from scene.refusal import BadInput
 
@@ -36,27 +37,16 @@ KILL_TIMEOUT = 5.0  # seconds until what cannot be killed is given up
 SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of <linux/prctl.h>
 
 
-class _Entry(NamedTuple):
-    """A line of the process table; `born` tells a process from a later one of the same number."""
-
-    pid: int
-    state: str
-    parent: int
-    session: int
-    born: int
-
-
 class Descendants:
     """The processes that descend from one command."""
 
     _leaders: ClassVar[set[int]] = set()
-    _before: ClassVar[set[tuple[int, int]]] = set()  # children of this process older than all commands
+    _before: ClassVar[set[psutil.Process]] = set()  # children of this process older than all commands
 
     def __init__(self) -> None:
         self._leader = 0
         if not self._leaders:
-            mine = os.getpid()
-            Descendants._before = {(entry.pid, entry.born) for entry in _table() if entry.parent == mine}
+            Descendants._before = set(psutil.Process().children())
         _adopt_orphans(True)
 
     def follow(self, leader: int) -> None:
@@ -67,13 +57,16 @@ class Descendants:
         else:
             _adopt_orphans(bool(self._leaders))
 
-    def alive(self) -> list[int]:
+    def alive(self) -> list[psutil.Process]:
         """List the live ones, the leader left out; those that are dead are reaped."""
-        table = {entry.pid: entry for entry in _table()}
-        found = set(self._adopted(table.values())) | {self._leader}
-        while more := {pid for pid, entry in table.items() if entry.parent in found} - found:
+        parents: dict[psutil.Process, int] = {}
+        for process in psutil.Process().children(recursive=True):
+            with contextlib.suppress(psutil.Error):
+                parents[process] = process.ppid()
+        found = set(self._adopted(parents)) | {self._leader}
+        while more := {process.pid for process, parent in parents.items() if parent in found} - found:
             found |= more
-        return sorted(pid for pid in found - {self._leader} if table[pid].state != "Z")
+        return [process for process in parents if process.pid in found - {self._leader} and _is_live(process)]
 
     def kill(self) -> None:
         """Kill the leader's group and all descendants; the leader is not reaped."""
@@ -81,40 +74,41 @@ class Descendants:
             os.killpg(self._leader, signal.SIGKILL)
         deadline = time.monotonic() + KILL_TIMEOUT
         while (alive := self.alive()) and time.monotonic() < deadline:
-            for pid in alive:
-                with contextlib.suppress(ProcessLookupError, PermissionError):
-                    os.kill(pid, signal.SIGKILL)
+            for process in alive:
+                with contextlib.suppress(psutil.Error):
+                    process.kill()
             time.sleep(POLL / 5)
         self._leaders.discard(self._leader)
         _adopt_orphans(bool(self._leaders))
 
-    def _adopted(self, table: Iterable[_Entry]) -> Iterator[int]:
+    def _adopted(self, parents: dict[psutil.Process, int]) -> Iterator[int]:
         # Orphans that became children of this process, when they can only be this command's.
         if self._leaders != {self._leader}:
             return
-        mine, session = os.getpid(), os.getsid(0)
-        for entry in table:
-            is_known = entry.pid == self._leader or (entry.pid, entry.born) in self._before
-            if entry.parent != mine or entry.session == session or is_known:
+        mine = os.getpid()
+        session = os.getsid(0)
+        for process, parent in parents.items():
+            if parent != mine or process.pid == self._leader or process in self._before:
                 continue
-            if entry.state == "Z":
-                with contextlib.suppress(ChildProcessError):
-                    os.waitpid(entry.pid, os.WNOHANG)
-            else:
-                yield entry.pid
+            with contextlib.suppress(OSError):  # it has ended
+                if os.getsid(process.pid) == session:
+                    continue
+                if _is_live(process):
+                    yield process.pid
+                else:
+                    os.waitpid(process.pid, os.WNOHANG)
+
+
+def _is_live(process: psutil.Process) -> bool:
+    try:
+        return bool(process.status() != psutil.STATUS_ZOMBIE)
+    except psutil.Error:  # it has ended, and is another's to reap
+        return False
 
 
 def _adopt_orphans(is_wanted: bool) -> None:
     with contextlib.suppress(OSError, AttributeError):  # another system has no prctl
         ctypes.CDLL(None).prctl(SUBREAPER, int(is_wanted), 0, 0, 0)
-
-
-def _table() -> Iterator[_Entry]:
-    for place in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):
-            # The name, in parentheses, may itself hold spaces and parentheses.
-            fields = place.read_text("utf-8", "replace").rpartition(")")[2].split()
-            yield _Entry(int(place.parent.name), fields[0], int(fields[1]), int(fields[3]), int(fields[19]))
 
 
 MAX_LINE = 2**24  # bytes of one answer: a trajectory of 10^5 collisions

@@ -1,4 +1,4 @@
-"""What a claim is, the evidence it is held against, its checks, and the verdict that follows from them.
+"""What a claim is, the evidence it is compared with, its checks, and the verdict that follows.
 
 A check compares one number, or decides one statement. Its form is `claim` for what the paper says,
 `printed` for a form that is expected to fail, `corrected` for the form that must then hold.
@@ -73,8 +73,8 @@ class Claim(NamedTuple):
         statement: what the paper says; for a misprint, printed and corrected form.
         method: how it is checked.
         tolerance: what is accepted, with its reason.
-        expected: the verdict that stands when every check of a claim and of a corrected form holds, and
-            one of the printed form fails.
+        expected: the verdict that stands when every check of a claim and of a corrected form holds,
+            and one of the printed form fails.
         examine: makes the checks.
         runs: names of the simulations it needs.
     """
@@ -101,8 +101,8 @@ class Finding(NamedTuple):
 def verdict_of(claim: Claim, checks: list[Check]) -> Verdict:
     """Return the verdict that the checks make.
 
-    A printed form stands when all its checks hold; then a misprint is "confirmed" after all. Any other
-    failure refutes the claim; a check that cannot tell leaves it open.
+    A printed form stands when all its checks hold; then a misprint is "confirmed" after all. Any
+    other failure refutes the claim; a check that cannot tell leaves it open.
     """
     printed = [check.holds for check in checks if check.form == "printed"]
     others = [check.holds for check in checks if check.form != "printed"]
@@ -155,8 +155,11 @@ class ClaimEvidence:
         threads: int | None = None,
         predict: Predict = theory.predict,
     ) -> None:
-        self._samples, self.steppers = samples, steppers
-        self.size, self.seed, self.threads = size, seed, threads
+        self._samples = samples
+        self.steppers = steppers
+        self.size = size
+        self.seed = seed
+        self.threads = threads
         self._predict = predict
 
     def sample(self, run: str) -> Sample:

@@ -14,10 +14,11 @@ from fast.ensemble import SHARE
 from mushrooms.audit import session
 from mushrooms.audit.claim import AuditSteppers, Claim
 from mushrooms.audit.claims import all_claims, select_claims
-from mushrooms.audit.ensemble_command import Options, audit_ensemble
+from mushrooms.audit.ensemble_command import audit_ensemble
+from mushrooms.audit.options import AuditOptions
 from mushrooms.audit.page import to_data, to_html, to_json, to_text
-from mushrooms.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
-from mushrooms.audit.session import AuditResult, AuditSettings
+from mushrooms.audit.runs import Simulation, Size, run_seed, scene_of
+from mushrooms.audit.session import AuditResult, AuditSettings, needed
 from mushrooms.folders import locked, writable_folder
 from mushrooms.output import write_report
 from mushrooms.progress import Watch, announce_compilation, progress_bar
@@ -29,79 +30,58 @@ from scene.files.writer import named
 from scene.refusal import refuse_unheeded
 
 
-def audit_claims(
-    out: Path,
-    full: bool,
-    only: str | None,
-    seed: int,
-    threads: int | None,
-    resume: bool,
-    commands: bool,
-    as_json: bool,
-    ensemble: Path | None,
-    scene: str | None,
-    backwards: Path | None,
-    energy: float | None,
-    energy_unit: str | None,
-    time_unit: str | None,
-    particles: int | None,
-) -> int:
+def audit_claims(options: AuditOptions) -> int:
     """Check the paper's claims, or an ensemble of another program; return the exit code."""
-    if ensemble is None:
+    if options.ensemble is None:
         refuse_unheeded(
             {
-                "--scene": scene,
-                "--backwards": backwards,
-                "--energy": energy,
-                "--energy-unit": energy_unit,
-                "--time-unit": time_unit,
-                "--particles": particles,
+                "--scene": options.scene,
+                "--backwards": options.backwards,
+                "--energy": options.energy,
+                "--energy-unit": options.energy_unit,
+                "--time-unit": options.time_unit,
+                "--particles": options.particles,
             },
             "there is no --ensemble",
         )
-        return _audit_paper(out, full, only, seed, threads, resume, commands, as_json)
+        return _audit_paper(options)
     refuse_unheeded(
         {
-            "--full": full or None,
-            "--only": only,
-            "--threads": threads,
-            "--resume": resume or None,
-            "--commands": commands or None,
+            "--full": options.full or None,
+            "--only": options.only,
+            "--threads": options.threads,
+            "--resume": options.resume or None,
+            "--commands": options.commands or None,
         },
         "an --ensemble is audited",
     )
-    options = Options(energy, energy_unit or "v2/2", time_unit, particles)
-    return audit_ensemble(ensemble, scene, backwards, options, out, as_json)
+    return audit_ensemble(options.ensemble, options)
 
 
-def _audit_paper(
-    out: Path,
-    full: bool,
-    only: str | None,
-    seed: int,
-    threads: int | None,
-    resume: bool,
-    commands: bool,
-    as_json: bool,
-) -> int:
+def _audit_paper(options: AuditOptions) -> int:
     """Conduct the audit of the paper's claims."""
+    only = options.only
     if only is not None and not only.replace(",", " ").split():
-        raise BadInput(f"--only = {only!r}, must name a claim such as X2; all are checked without it")
+        raise BadInput(
+            f"--only = {only!r}, must name a claim such as X2; all are checked without it"
+        )
     claims = select_claims(only or "")
-    size: Size = "full" if full else "quick"
-    if commands:
-        lines = [command(run, size, seed, out) for run in needed(claims, size)]
-        print(json.dumps(lines, indent=2) if as_json else "\n".join(lines))
+    size: Size = "full" if options.full else "quick"
+    if options.commands:
+        lines = [command(run, size, options.seed, options.out) for run in needed(claims, size)]
+        print(json.dumps(lines, indent=2) if options.as_json else "\n".join(lines))
         return 0
-    with writable_folder(out) as folder, locked(folder):
-        settings = AuditSettings(size, seed, threads, folder / "findings", resume)
-        # What a killed audit was writing: no other process writes under these names, as the folder is held.
+    with writable_folder(options.out) as folder, locked(folder):
+        findings = folder / "findings"
+        settings = AuditSettings(size, options.seed, options.threads, findings, options.resume)
+        # What a killed audit was writing: no other process writes under these names, as the folder
+        # is held.
         for path in (*folder.glob(".report.*.part"), *folder.glob("findings/.*.finding.*.part")):
             path.unlink(missing_ok=True)
         result = _conduct(folder, settings, claims)
         data = to_data(result)
         page = to_html(data, result.samples)
-        write_report(folder, to_json(data), to_text(data), page, as_json)
+        write_report(folder, to_json(data), to_text(data), page, options.as_json)
     return 0 if result.is_passed else 1
 
 
@@ -119,11 +99,15 @@ def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -
                 AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
                 settings,
                 claims=claims,
-                simulate_run=lambda name: partial(follow_run, folder / FOLDER / name, settings.resume),
+                simulate_run=lambda name: partial(
+                    follow_run, folder / FOLDER / name, settings.resume
+                ),
                 progress=lambda run, n_total, n_done: watch_of(run).update(n_done, n_total),
             )
     except (KeyboardInterrupt, OSError) as error:
-        error.add_note("finished parts are in the folder of the report: --resume continues the audit")
+        error.add_note(
+            "finished parts are in the folder of the report: --resume continues the audit"
+        )
         raise
 
 
@@ -136,18 +120,13 @@ def _check_report(folder: Path, wanted: set[str]) -> None:
         return
     if there - wanted:
         raise BadInput(
-            f"output {str(folder)!r} has a report of {len(there)} claims, size = {report.get('size')!r} and"
-            f" seed = {report.get('seed')}; {len(wanted)} are asked for: with --resume none is given up"
+            f"output {str(folder)!r} has a report of {len(there)} claims, size ="
+            f" {report.get('size')!r} and seed = {report.get('seed')}; {len(wanted)} are asked for:"
+            " with --resume none is given up"
         )
 
 
 FOLDER = "runs"
-
-
-def needed(claims: Sequence[Claim], size: Size) -> list[Simulation]:
-    """Return the runs that claims rest on, in the order in which they are made."""
-    runs = [RUNS[name] for name in dict.fromkeys(name for claim in claims for name in claim.runs)]
-    return [run for run in runs if run.n_particles(size)]
 
 
 def spec_of(run: Simulation, seed: int) -> RunSpec:
@@ -156,7 +135,7 @@ def spec_of(run: Simulation, seed: int) -> RunSpec:
 
 
 def command(run: Simulation, size: Size, seed: int, folder: Path) -> str:
-    """Return the command that makes a run where an audit in the folder takes it up with --resume."""
+    """Return the command that makes a run where an audit with --resume takes it up."""
     return spec_of(run, seed).command(run.scene, run.n_particles(size), folder / FOLDER / run.name)
 
 
@@ -211,8 +190,9 @@ def follow_run(
 def block_size(spec: RunSpec, n_particles: int, threads: int) -> int:
     """Return how many particles of a new run are kept at a time, at most all of them.
 
-    At the end of a block the lanes wait for its slowest particle. Energies spread with the cycles, so that
-    what takes seconds has too few particles to wait for: each thread has a share of `fast`, at the least.
+    At the end of a block the lanes wait for its slowest particle. Energies spread with the cycles,
+    so that what takes seconds has too few particles to wait for: each thread has a share of `fast`,
+    at the least.
     """
     wanted = max(conduct.block_size(spec, threads), SHARE * threads) * spec.n_cycles
     return min(wanted, conduct.MOST_BLOCK, n_particles)

@@ -1,13 +1,13 @@
-"""Somebody else's ensemble, held to what the paper claims for its scene: one cycle, and sums of several.
+"""An ensemble of another program, compared with what the paper claims for its scene.
 
-Each figure is a `Check`, as in the audit: theory at that energy with what it leaves out, the departure that a
-sample of this size would show, and the power against a rival. A scene without frozen rates has the adiabatic
-theory only; then a band is granted that no rates confirm, (walls' speed / particles' speed)^(2/3), the order
-of the first correction.
+Each figure is a `Check`, as in the audit: theory at that energy with what it leaves out, the
+departure that a sample of this size would show, and the power against a rival. A scene without
+frozen rates has the adiabatic theory only; then a band is granted that no rates confirm, (walls'
+speed / particles' speed)^(2/3), the order of the first correction.
 
-Where a check fails, rivals tell what is likely wrong: each is a mistake that people make, known by what it
-does to log E1/E0 or to the capture intervals. One is named when the whole distribution is within chance of
-its own, and no more than a third as far off as theory's.
+Where a check fails, rivals tell what is likely wrong: each is a mistake that people make, known by
+what it does to log E1/E0 or to the capture intervals. One is named when the whole distribution is
+within chance of its own, and no more than a third as far off as theory's.
 
 Not handled: starts of several energies, tables other than mushrooms.
 """
@@ -41,22 +41,26 @@ from mushrooms.audit.tolerances import (
     steepest,
 )
 from scene import BadInput, Mushroom
-from scene.geometry import half_width, table_at
-from scene.laws import bounds, values
+from scene.geometry import table_at
 from scene.transforms import backwards
 from theory.finite_energy.one_cycle import TheoryError
 
 IDENTITY = "mean of E0/E1, which is 1 in the limit"
-SHARE, PEAK = "p_nc: share never captured", "log E_nc: mean of log E1/E0 of the never captured"
-FREE, CAPTURED = "log E1/E0 of the never captured", "log E1/E0 of the captured"
-TIMES, RELEASE = "times of capture", "nu at release less nu at capture"
-STARTS, OUTWARD = "share of the starts in the cap", "mean of (x^2 + y^2) / r^2 of these"
+SHARE = "p_nc: share never captured"
+PEAK = "log E_nc: mean of log E1/E0 of the never captured"
+FREE = "log E1/E0 of the never captured"
+CAPTURED = "log E1/E0 of the captured"
+TIMES = "times of capture"
+RELEASE = "nu at release less nu at capture"
+STARTS = "share of the starts in the cap"
+OUTWARD = "mean of (x^2 + y^2) / r^2 of these"
 MOST_DRAWN = 2_000_000  # gains of cycles that are drawn from theory
 MOST_SORTED = 1_000_000  # values whose whole distribution is tested; of more, evenly spaced ones
 N_TIMES = 4096  # of a cycle, at which laws are looked at
 FEW = 20  # particles below which a group says nothing
 N_LEVELS = 50  # of s, at which two directions are compared
-WAITS = 4  # longest flights between two arc hits, which captures and releases are told late by, and lags
+# Longest flights between two arc hits, which captures and releases are told late by, and lags.
+WAITS = 4
 N_LOOKED_AT = 20_000  # particles
 NEARER = 1 / 3  # of theory's distance, that a rival may have
 CLOSE = 0.02  # distance that no chance explains, but that a rival's own error may
@@ -75,11 +79,13 @@ class GivenEnsemble(NamedTuple):
         energy: of every start, v^2 / 2 in the scene's units.
         s: (n,) log E1 / E0.
         captured: (n,) which were captured; None where nothing tells.
-        t_in, t_out: (n,) ends of the capture interval [scene's time]; nan for none; None where not given.
+        t_in, t_out: (n,) ends of the capture interval [scene's time]; nan for none; None where not
+            given.
         x0, y0: (n,) where each started; None where not given.
         n_lost: rows without an energy, or particles without a row.
         is_binary32: whether every energy is a number of 24 bits.
-        later: (n, K - 1) log E_k / E0 after the second of K cycles and each that follows; None for one cycle.
+        later: (n, K - 1) log E_k / E0 after the second of K cycles and each that follows; None for
+            one cycle.
     """
 
     scene: Mushroom
@@ -96,11 +102,17 @@ class GivenEnsemble(NamedTuple):
 
 
 class HighEnergies:
-    """The limit of high energies, by the names of `theory.FiniteEnergy`; what it leaves out is a guess."""
+    """The limit of high energies, by the names of `theory.FiniteEnergy`.
+
+    What it leaves out is a guess.
+    """
 
     def __init__(self, scene: Mushroom, energy: float) -> None:
-        found, self._curve = theory.predict(scene, 12), theory.energies(scene)
-        self.mean_s, self.p_nc, self.peak = float(found.m1), float(found.p_nc), (float(found.log_e_nc), 0.0)
+        found = theory.predict(scene, 12)
+        self._curve = theory.energies(scene)
+        self.mean_s = float(found.m1)
+        self.p_nc = float(found.p_nc)
+        self.peak = (float(found.log_e_nc), 0.0)
         self.cdf = self._curve.cdf
         left_out = (walls_speed(scene) / math.sqrt(2 * energy)) ** (2 / 3)
         self.theory_error = TheoryError(left_out, left_out, left_out, left_out, 0.0, 0.0)
@@ -122,7 +134,9 @@ class HighEnergies:
 
     def capture_cdf(self, t: FloatArray) -> FloatArray:
         """Return the distribution of the time of capture."""
-        return np.asarray(np.interp(t, self._edges[1:], self._captured / max(self._captured[-1], 1e-12)))
+        return np.asarray(
+            np.interp(t, self._edges[1:], self._captured / max(self._captured[-1], 1e-12))
+        )
 
 
 Theory = theory.FiniteEnergy | HighEnergies
@@ -150,7 +164,7 @@ def cycle_start(scene: Mushroom) -> float:
 
 def nu_at(scene: Mushroom, times: FloatArray) -> FloatArray:
     """Return w / r at times."""
-    return np.asarray(half_width(fp, scene, times) / values(scene.r, times))
+    return np.asarray(scene.width.values(times) / scene.laws["r"].values(times))
 
 
 def checks(given: GivenEnsemble, theirs: Theory) -> list[Check]:
@@ -166,8 +180,12 @@ def checks(given: GivenEnsemble, theirs: Theory) -> list[Check]:
 
 
 def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Theory) -> Check:
-    """Hold two directions of one cycle to p_rev(-s) = p(s) exp(-s): to the share below s, at its worst."""
-    here, there = _some(given.s), -_some(other.s)
+    """Compare two directions of one cycle by p_rev(-s) = p(s) exp(-s).
+
+    Compared is the share below s, where it differs most.
+    """
+    here = _some(given.s)
+    there = -_some(other.s)
     places = np.quantile(np.concatenate([here, there]), np.linspace(0.01, 0.99, N_LEVELS))
     pairs = [(mean(np.exp(-here) * (here <= x)), mean(there <= x)) for x in places]
     found = [(one.value - two.value, float(np.hypot(one.error, two.error))) for one, two in pairs]
@@ -183,7 +201,8 @@ def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Theory) -> Chec
 
 def _in_errors(difference: tuple[float, float]) -> float:
     """Return a difference in its standard errors; that of very few particles may have no error."""
-    size, error = abs(difference[0]), difference[1]
+    size = abs(difference[0])
+    error = difference[1]
     if error == 0:
         return math.inf if size else 0.0
     return size / error
@@ -206,11 +225,15 @@ def _records(given: GivenEnsemble) -> Iterator[Check]:
 
 
 def _starts(given: GivenEnsemble) -> Iterator[Check]:
-    """Hold the starts to a uniform density in area, by how many are in the cap, and how far out there."""
+    """Compare the starts with a uniform density in area.
+
+    Compared are how many are in the cap, and how far out they are there.
+    """
     if given.x0 is None or given.y0 is None:
         return
     now = table_at(fp, given.scene, cycle_start(given.scene))
-    is_in_cap, cap = given.y0 > 0, float(now.cap_area())
+    is_in_cap = given.y0 > 0
+    cap = float(now.cap_area())
     yield close(STARTS, share(is_in_cap), cap / (cap + float(now.stem_area())), scale=0.3)
     if is_in_cap.sum() >= FEW:
         out = (given.x0[is_in_cap] ** 2 + given.y0[is_in_cap] ** 2) / float(now.r) ** 2
@@ -218,10 +241,18 @@ def _starts(given: GivenEnsemble) -> Iterator[Check]:
 
 
 def _energies(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
-    s, left = given.s, theirs.theory_error
+    s = given.s
+    left = theirs.theory_error
     rival = ("no growth", 0.0) if theirs.mean_s else None
     scale = max(abs(theirs.mean_s), left.mean_s) * 4
-    yield close("m1: mean of log E1/E0", mean(s), theirs.mean_s, band=left.mean_s, scale=scale, against=rival)
+    yield close(
+        "m1: mean of log E1/E0",
+        mean(s),
+        theirs.mean_s,
+        band=left.mean_s,
+        scale=scale,
+        against=rival,
+    )
     yield close(
         IDENTITY,
         mean(np.exp(-s)),
@@ -231,13 +262,17 @@ def _energies(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     )
     if isinstance(theirs, theory.FiniteEnergy):
         mirrored = ("the wrong sign of every gain", lambda x: 1 - theirs.cdf(-np.asarray(x)))
-        yield fits("log E1/E0", _some(s), theirs.cdf, band=peak_band(theirs), scale=0.3, against=mirrored)
+        yield fits(
+            "log E1/E0", _some(s), theirs.cdf, band=peak_band(theirs), scale=0.3, against=mirrored
+        )
 
 
 def _captures(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     if given.captured is None:
         return
-    free, caught, left = given.s[~given.captured], given.s[given.captured], theirs.theory_error
+    free = given.s[~given.captured]
+    caught = given.s[given.captured]
+    left = theirs.theory_error
     yield close(
         SHARE,
         share(~given.captured),
@@ -256,7 +291,9 @@ def _captures(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
         yield close("width of their peak", spread(free), sigma, band=sigma * left.variance / 2)
         yield fits(FREE, _some(free), theirs.free_cdf, band=band, scale=0.4)
     if len(caught) >= FEW and theirs.p_nc < 1:
-        band += left.captured_mean * steepest(theirs.captured_cdf, *np.quantile(caught, (0.001, 0.999)))
+        band += left.captured_mean * steepest(
+            theirs.captured_cdf, *np.quantile(caught, (0.001, 0.999))
+        )
         yield fits(CAPTURED, _some(caught), theirs.captured_cdf, band=band, scale=0.4)
 
 
@@ -266,15 +303,18 @@ def _capture_intervals(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     t_in = given.t_in[np.isfinite(given.t_in)]
     if len(t_in) < FEW:
         return
-    wait = 2 * float(bounds(given.scene.r).highest) / math.sqrt(2 * given.energy)
+    wait = 2 * float(given.scene.laws["r"].bounds().highest) / math.sqrt(2 * given.energy)
     band = seen_late(theirs.capture_cdf, t_in, wait) + theirs.theory_error.captured_mean
     yield fits(TIMES, _some(t_in), theirs.capture_cdf, band=band, scale=0.4)
     if given.t_out is None:
         return
-    begin, end = _some(given.t_in), _some(given.t_out)
+    begin = _some(given.t_in)
+    end = _some(given.t_out)
     both = np.isfinite(begin) & np.isfinite(end)
     rate = N_TIMES / given.scene.period
-    steepest = rate * float(np.max(np.abs(np.diff(nu_at(given.scene, np.arange(N_TIMES + 1) / rate)))))
+    steepest = rate * float(
+        np.max(np.abs(np.diff(nu_at(given.scene, np.arange(N_TIMES + 1) / rate))))
+    )
     yield close(
         RELEASE,
         mean(nu_at(given.scene, end[both]) - nu_at(given.scene, begin[both])),
@@ -284,14 +324,18 @@ def _capture_intervals(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
 
 
 def _later(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
-    """Hold log E_k/E0 after each further cycle to sums of k cycles, drawn from theory where it has rates."""
+    """Compare log E_k/E0 after each further cycle with sums of k cycles.
+
+    They are drawn from theory where it has rates.
+    """
     if given.later is None:
         return
     n_cycles = 1 + given.later.shape[1]
     n_drawn = MOST_DRAWN // n_cycles
     drawn = None if isinstance(theirs, HighEnergies) else theirs.draw(n_cycles, n_drawn, DRAWN_SEED)
     for k, total in enumerate(given.later.T, 2):
-        what, band = f"log E{k}/E0", k * theirs.theory_error.mean_s
+        what = f"log E{k}/E0"
+        band = k * theirs.theory_error.mean_s
         if drawn is None:
             yield close(f"mean of {what}", mean(total), k * theirs.mean_s, band=band)
             continue
@@ -308,7 +352,7 @@ def _some(values: FloatArray, most: int = MOST_SORTED) -> FloatArray:
 
 
 class Rival(NamedTuple):
-    """A mistake: what is said of it, what undoes it in s, and the distribution that is then left."""
+    """A mistake: what is said of it, what undoes it in s, and the distribution then left."""
 
     said: str
     cdf: Cdf
@@ -316,16 +360,24 @@ class Rival(NamedTuple):
 
 
 def likely_causes(given: GivenEnsemble, theirs: Theory, found: list[Check]) -> list[str]:
-    """Say what is likely wrong, a line each; nothing where every check holds or nothing known fits."""
+    """Say what is likely wrong, a line each.
+
+    Nothing where every check holds or nothing known fits.
+    """
     wrong = {check.what for check in found if check.holds is False}
     if not wrong:
         return []
     records = list(_told_by_records(given, theirs))
-    if (end := _common_end(given)) is not None:
-        return [*records, f"many captures end together at {end:.3f} of the cycle: it was followed no further"]
+    end = _common_end(given)
+    if end is not None:
+        return [
+            *records,
+            f"many captures end together at {end:.3f} of the cycle: it was followed no further",
+        ]
     told = [*records, *_told_by_captures(given, theirs, wrong)]
     s = _some(given.s, N_LOOKED_AT)
-    distance, reach = gap(s, theirs.cdf), critical_gap(len(s)) + shape_band(theirs)
+    distance = gap(s, theirs.cdf)
+    reach = critical_gap(len(s)) + shape_band(theirs)
     if distance <= reach:
         return told
     fitting = []
@@ -352,7 +404,10 @@ def _told_by_records(given: GivenEnsemble, theirs: Theory) -> Iterator[str]:
     if given.n_lost > MAX_LOST * n:
         lost = given.n_lost / n
         yield f"{lost:.1%} of the particles are missing: no figure is judged without them"
-        if given.captured is not None and abs(lost - (1 - theirs.p_nc)) < 3 * (0.25 / n) ** 0.5 + 0.01:
+        if (
+            given.captured is not None
+            and abs(lost - (1 - theirs.p_nc)) < 3 * (0.25 / n) ** 0.5 + 0.01
+        ):
             share = f"{1 - theirs.p_nc:.1%}"
             yield f"as many are missing as theory has captured, {share}: captured ones were dropped"
     if given.captured is not None and not given.captured.any() and theirs.p_nc < 1:
@@ -360,7 +415,7 @@ def _told_by_records(given: GivenEnsemble, theirs: Theory) -> Iterator[str]:
 
 
 def _common_end(given: GivenEnsemble) -> float | None:
-    """Return the part of the cycle after which no capture interval goes on, if many last until then."""
+    """Return the part of the cycle where many capture intervals end and none goes on."""
     if given.t_out is None or not np.isfinite(given.t_out).any():
         return None
     ends = (given.t_out - cycle_start(given.scene)) / given.scene.period
@@ -377,15 +432,18 @@ def _told_by_captures(given: GivenEnsemble, theirs: Theory, wrong: set[str]) -> 
         drop = np.nanmean(nu_at(given.scene, given.t_out) - nu_at(given.scene, given.t_in))
         how = "before" if drop < 0 else "after"
         yield (
-            f"captured particles are let out {how} the mouth is as wide as when they were caught (nu by"
-            f" {abs(drop):.3f}): the mouth's edge leaks, or base and arc do not keep the angle"
+            f"captured particles are let out {how} the mouth is as wide as when they were caught"
+            f" (nu by {abs(drop):.3f}): the mouth's edge leaks, or base and arc do not keep the"
+            " angle"
         )
     elif SHARE in wrong:
         share = float(np.mean(np.isfinite(given.t_in)))
-        few, more = "few" if share < 1 - theirs.p_nc else "many", "; or starts are not uniform"
+        few = "few" if share < 1 - theirs.p_nc else "many"
+        more = "; or starts are not uniform"
         yield (
-            f"too {few} are captured, {share:.1%} for {1 - theirs.p_nc:.1%}: the mouth is not as wide as its"
-            f" law says, as where its corners leak{more if wrong.isdisjoint((TIMES, CAPTURED)) else ''}"
+            f"too {few} are captured, {share:.1%} for {1 - theirs.p_nc:.1%}: the mouth is not as"
+            " wide as its law says, as where its corners"
+            f" leak{more if wrong.isdisjoint((TIMES, CAPTURED)) else ''}"
         )
 
 
@@ -398,14 +456,17 @@ def _rivals(given: GivenEnsemble, theirs: Theory, right_groups: bool) -> Iterato
         "a logarithm to base 10 is given": lambda s: s * np.log(10),
     }
     yield from (Rival(said, theirs.cdf, undoing) for said, undoing in undo.items())
-    yield Rival("only the never captured are there: captured particles were dropped", theirs.free_cdf)
+    yield Rival(
+        "only the never captured are there: captured particles were dropped", theirs.free_cdf
+    )
     if theirs.p_nc < 1:
         yield Rival("only the captured are there", theirs.captured_cdf)
     if theirs.p_nc < 1 and (given.captured is None or (given.captured.any() and right_groups)):
         p = _share_of_the_free(given, theirs)
         yield Rival(
-            f"never captured {p:.1%}, where theory has {theirs.p_nc:.1%}, both with the right energies:"
-            " starts are not uniform in area and direction, or a share of one group is lost",
+            f"never captured {p:.1%}, where theory has {theirs.p_nc:.1%}, both with the right"
+            " energies: starts are not uniform in area and direction, or a share of one group is"
+            " lost",
             lambda s: p * theirs.free_cdf(s) + (1 - p) * theirs.captured_cdf(s),
         )
     variance = max(theirs.peak[1], 1e-18)
@@ -423,6 +484,8 @@ def _share_of_the_free(given: GivenEnsemble, theirs: Theory) -> float:
     if given.captured is not None:
         return float(np.mean(~given.captured))
     s = _some(given.s, N_LOOKED_AT)
-    free, captured = theirs.free_cdf(np.sort(s)), theirs.captured_cdf(np.sort(s))
-    steps, apart = (np.arange(len(s)) + 0.5) / len(s) - captured, free - captured
+    free = theirs.free_cdf(np.sort(s))
+    captured = theirs.captured_cdf(np.sort(s))
+    steps = (np.arange(len(s)) + 0.5) / len(s) - captured
+    apart = free - captured
     return float(np.clip(steps @ apart / (apart @ apart), 0.0, 1.0))

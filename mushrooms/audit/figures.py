@@ -1,7 +1,7 @@
-"""The figures of the claims: which figure belongs to which claim, the simulations it shows, how it is drawn.
+"""The figures of the claims: which claim each belongs to, its simulations, how it is drawn.
 
-They show one cycle and many, laws through the cycle and against energy, and the frozen table, with the theory
-over the simulation.
+They show one cycle and many, laws through the cycle and against energy, and the frozen table, with
+the theory over the simulation.
 """
 
 import math
@@ -48,8 +48,8 @@ from mushrooms.figures.style import (
 )
 from mushrooms.orbits import follow
 from scene import Scene, load
-from scene.laws import FloatArray, values
-from scene.tables import Mushroom, laws
+from scene.pieces import FloatArray
+from scene.tables import Mushroom
 
 Panels = Any  # axes as `new_figure` returns them
 N_SUM_BINS = 300
@@ -58,9 +58,10 @@ N_PHASES = 6
 
 
 def loops(panels: Panels) -> None:
-    """Draw the cycles: in the plane (w, h) of sec. 4.1 and the plane (V_ell/V_cap, V_cap/V) of sec. 3.5."""
-    fixed, moving = load("fixed-cap-anticlockwise"), load("moving-cap")
-    w, h = (values(laws(fixed)[name], np.linspace(0, 1, N_LOOP + 1)) for name in "wh")
+    """Draw the cycles in the plane (w, h) of sec. 4.1 and in (V_ell/V_cap, V_cap/V) of sec. 3.5."""
+    fixed = load("fixed-cap-anticlockwise")
+    moving = load("moving-cap")
+    w, h = (fixed.laws[name].values(np.linspace(0, 1, N_LOOP + 1)) for name in "wh")
     _loop(panels[0], w, h)
     panels[0].set(xlabel="half-width w", ylabel="depth h", title="fixed cap, anticlockwise")
     titles = ("fixed cap, anticlockwise", "moving cap")
@@ -77,19 +78,26 @@ def _loop(axes: Axes, x: FloatArray, y: FloatArray) -> None:
         i = k * N_LOOP // N_PHASES
         axes.plot(x[i], y[i], "o", color=colour, markersize=6, label=f"{k}/{N_PHASES}")
         j = i + N_LOOP // (2 * N_PHASES)
-        start, end = (x[j - 2], y[j - 2]), (x[j], y[j])
+        start = (x[j - 2], y[j - 2])
+        end = (x[j], y[j])
         if start != end:
-            axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 0})
+            axes.annotate(
+                "", end, start, arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 0}
+            )
 
 
-def _bars(axes: Axes, values: FloatArray, edges: FloatArray, n: int | None = None, **style: Any) -> None:
+def _bars(
+    axes: Axes, values: FloatArray, edges: FloatArray, n: int | None = None, **style: Any
+) -> None:
     """Draw a histogram of values as a density; n are all, where some have no value."""
     heights = np.histogram(values, edges)[0] / ((n or len(values)) * np.diff(edges))
     usual: dict[str, Any] = {"fill": True, "color": SKY, "label": "simulation"}
     axes.stairs(heights, edges, **usual | style)
 
 
-def _points(axes: Axes, x: Sequence[float] | FloatArray, values: Sequence[Mean], **style: Any) -> None:
+def _points(
+    axes: Axes, x: Sequence[float] | FloatArray, values: Sequence[Mean], **style: Any
+) -> None:
     """Draw measured values with their standard errors."""
     found, errors = zip(*values, strict=True)
     usual: dict[str, Any] = {"fmt": "o", "markersize": 4, "label": "simulation, ± 1 standard error"}
@@ -97,14 +105,20 @@ def _points(axes: Axes, x: Sequence[float] | FloatArray, values: Sequence[Mean],
 
 
 def retraced(panels: Panels, sample: Sample) -> None:
-    """Draw the retraced arc in the plane of sec. 3.5, captures joined to their releases, and its energies."""
+    """Draw the retraced arc in the plane of sec. 3.5, and its energies.
+
+    Lines join captures to their releases.
+    """
     left, right = panels
     scene = scene_of(sample.run)
     assert isinstance(scene, Mushroom)
-    left.plot(*_volume_shares(scene, np.linspace(0, scene.period, N_LOOP)), color=BLACK, linewidth=1.2)
+    left.plot(
+        *_volume_shares(scene, np.linspace(0, scene.period, N_LOOP)), color=BLACK, linewidth=1.2
+    )
     curve = theory.capture_curve(scene, 4 * N_PHASES + 1)
     first = curve.t_in < curve.t_out.min()  # on the way back captures and releases change places
-    t_in, t_out = curve.t_in[first], curve.t_out[first]
+    t_in = curve.t_in[first]
+    t_out = curve.t_out[first]
     for colour, label, times in ((BLUE, "captures", t_in), (ORANGE, "releases", t_out)):
         left.plot(*_volume_shares(scene, times), "o", color=colour, markersize=5, label=label)
     for pair in zip(t_in, t_out, strict=True):
@@ -135,7 +149,10 @@ def gain_of_capture(axes: Axes) -> None:
 
 
 def energies(panels: Panels, *samples: Sample) -> None:
-    """Draw histograms of log E1/E0 with theory over them, and below what is left, in standard errors."""
+    """Draw histograms of log E1/E0 with theory over them.
+
+    Below is what is left, in standard errors.
+    """
     for (panel, rest), sample in zip(panels, samples, strict=True):
         _energies(panel, rest, sample)
         # Below: within the panel it would cover the caustic or a peak, wherever a scene has them.
@@ -160,13 +177,15 @@ def capture_times(panels: Panels, *samples: Sample) -> None:
         edges = np.linspace(curve.t_in[0], curve.t_in[-1], 51)
         mass = np.asarray(theory.capture_time_mass(scene, edges)) / np.diff(edges)
         _bars(panel, sample.first_capture[0], edges, sample.n)
-        panel.stairs(mass, edges, color=ORANGE, linewidth=1.5, label="theory, eq. (ps)", baseline=None)
+        panel.stairs(
+            mass, edges, color=ORANGE, linewidth=1.5, label="theory, eq. (ps)", baseline=None
+        )
         panel.set(xlabel="time of capture", ylabel="density", title=sample.run.name, ylim=(0, None))
     panels[0].legend(loc="upper left", fontsize=7)
 
 
 def sums(panels: Panels, *samples: Sample) -> None:
-    """Draw log E_n/E0 over n of the last run there is: density, and its tails on a logarithmic axis."""
+    """Draw log E_n/E0 over n of the last run: density, and its tails on a logarithmic axis."""
     for row, n in zip(panels, (10, 30), strict=True):
         for panel, scale in zip(row, ("linear", "log"), strict=True):
             _sum(panel, samples[-1], n, scale)
@@ -175,12 +194,20 @@ def sums(panels: Panels, *samples: Sample) -> None:
 
 def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
     drawn = summed(sample.run.name, n)
-    centre, sd = drawn.mean / n, drawn.sd / n
+    centre = drawn.mean / n
+    sd = drawn.sd / n
     density, places = np.histogram(drawn.values / n, N_SUM_BINS, density=True)
     x = (places[1:] + places[:-1]) / 2
-    _bars(axes, sample.s[:, n - 1] / n, np.linspace(centre - 5 * sd, centre + 5 * sd, 51), baseline=1e-9)
+    _bars(
+        axes,
+        sample.s[:, n - 1] / n,
+        np.linspace(centre - 5 * sd, centre + 5 * sd, 51),
+        baseline=1e-9,
+    )
     axes.plot(x, density, color=BLACK, linewidth=1.3, label="sums of n cycles, by theory")
-    axes.plot(x, norm.pdf(x, centre, sd), color=ORANGE, linestyle="--", linewidth=1.2, label="Gaussian")
+    axes.plot(
+        x, norm.pdf(x, centre, sd), color=ORANGE, linestyle="--", linewidth=1.2, label="Gaussian"
+    )
     top = float(norm.pdf(0) / sd)
     limits = (0, 1.4 * top) if scale == "linear" else (top * 1e-5, 2 * top)
     axes.set(
@@ -195,7 +222,8 @@ def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
 
 def losses(axes: Axes, sample: Sample) -> None:
     """Draw the share with less energy than at first against the number of cycles."""
-    scene, n_cycles = scene_of(sample.run), sample.run.n_cycles
+    scene = scene_of(sample.run)
+    n_cycles = sample.run.n_cycles
     found = predicted(sample).draw(n_cycles, N_DRAWN // n_cycles, DRAWN_SEED)
     axes.plot(
         np.arange(1, n_cycles + 1),
@@ -207,7 +235,8 @@ def losses(axes: Axes, sample: Sample) -> None:
     places = np.unique(np.geomspace(1, n_cycles, 12).astype(int))
     far = np.array([theory.loss_probability(scene, int(k)) for k in places])
     axes.plot(places, far, "s", color=ORANGE, markersize=4, label="theory at infinite energy")
-    rate, late = float(theory.rarity(scene).rate), places[len(places) // 2 :]
+    rate = float(theory.rarity(scene).rate)
+    late = places[len(places) // 2 :]
     slope = far[-1] * np.exp(rate * (n_cycles - late))
     axes.plot(late, slope, ":", color=ORANGE, label=f"exp(-{rate:.4f} n)")
     _points(axes, places, [share(sample.s[:, k - 1] < 0) for k in places])
@@ -222,15 +251,25 @@ def losses(axes: Axes, sample: Sample) -> None:
 
 def stems(panels: Panels, tilted: Sample, upright: Sample) -> None:
     """Draw the uncaptured particles' energies of both stems, each from its own theory's."""
-    edges, sigma = np.linspace(-0.4, 0.8, 121), width(tilted).value
+    edges = np.linspace(-0.4, 0.8, 121)
+    sigma = width(tilted).value
     outline: dict[str, Any] = {"color": BLUE, "fill": False, "linewidth": 1.5}
     for panel, scale in zip(panels, ("linear", "log"), strict=True):
-        for sample, label, style in ((tilted, "tilted stem", {}), (upright, "upright stem", outline)):
-            kept = sample.gain[~sample.captured] - float(theory.predict(scene_of(sample.run)).log_e_nc)
+        for sample, label, style in (
+            (tilted, "tilted stem", {}),
+            (upright, "upright stem", outline),
+        ):
+            kept = sample.gain[~sample.captured] - float(
+                theory.predict(scene_of(sample.run)).log_e_nc
+            )
             _bars(panel, kept, edges, baseline=1e-3, label=label, **style)
         gaussian = norm.pdf(edges, sigma**2 / 4, sigma)
-        panel.plot(edges, gaussian, color=GREEN, linewidth=1.2, label="Gaussian, tilted stem's width")
-        panel.set(xlabel="ln(E1/E0) of the never captured, from theory's", ylabel="density", yscale=scale)
+        panel.plot(
+            edges, gaussian, color=GREEN, linewidth=1.2, label="Gaussian, tilted stem's width"
+        )
+        panel.set(
+            xlabel="ln(E1/E0) of the never captured, from theory's", ylabel="density", yscale=scale
+        )
     panels[1].set(ylim=(1e-3, 10))
     panels[0].legend()
 
@@ -247,31 +286,56 @@ def zone(panels: Panels, *samples: Sample) -> None:
         span = times[0] / sample.run.phases[0]
         fine = np.linspace(0, span, 400)
         curve = theory.chaotic_zone(scene_of(sample.run), fine)
-        left.plot(fine / span, curve.log_energy - curve.log_energy[0], color=ORANGE, label="theory, eq. (dE)")
+        left.plot(
+            fine / span,
+            curve.log_energy - curve.log_energy[0],
+            color=ORANGE,
+            label="theory, eq. (dE)",
+        )
         _points(left, sample.run.phases, means)
         left.set(xlabel="t / T", ylabel="mean ln(E/E0), not captured so far", title=sample.run.name)
         right.plot(fine / span, curve.p_cha, color=ORANGE, label="theory, eq. (ps)")
         shares = zone_share(sample, np.array(times))
         errors = [Mean(float(p), math.sqrt(max(p * (1 - p), 1e-6) / sample.n)) for p in shares]
         _points(right, sample.run.phases, errors)
-        right.set(xlabel="t / T", ylabel="share in the chaotic zone", title=sample.run.name, ylim=(0, 1.05))
+        right.set(
+            xlabel="t / T",
+            ylabel="share in the chaotic zone",
+            title=sample.run.name,
+            ylim=(0, 1.05),
+        )
         left.legend(loc="lower center")
         right.legend(loc="lower left")
 
 
 def widths(axes: Axes, *samples: Sample) -> None:
-    """Draw the width of the uncaptured peak against E0, with fitted powers: moving caps, then c = 0."""
-    moving, ergodic = list(samples[: len(PEAKS)]), list(samples[len(PEAKS) :])
-    for these, colour, marker, label in ((moving, BLUE, "o", "moving cap"), (ergodic, GREEN, "s", "c = 0")):
-        energies, values = [sample.run.energy for sample in these], [width(sample) for sample in these]
+    """Draw the width of the uncaptured peak against E0, with fitted powers.
+
+    Moving caps come first, then c = 0.
+    """
+    moving = list(samples[: len(PEAKS)])
+    ergodic = list(samples[len(PEAKS) :])
+    for these, colour, marker, label in (
+        (moving, BLUE, "o", "moving cap"),
+        (ergodic, GREEN, "s", "c = 0"),
+    ):
+        energies = [sample.run.energy for sample in these]
+        values = [width(sample) for sample in these]
         fit = fitted(these, values)
         text = f"{label}: exponent {fit.exponent:.4f} ± {fit.exponent_error:.4f}"
         _points(axes, energies, values, fmt=marker, color=colour, markersize=5, label=text)
-        axes.plot(energies, fit.coefficient * np.array(energies) ** fit.exponent, color=colour, linewidth=1)
+        axes.plot(
+            energies,
+            fit.coefficient * np.array(energies) ** fit.exponent,
+            color=colour,
+            linewidth=1,
+        )
     x = np.array([moving[0].run.energy, moving[-1].run.energy])
     printed = width(moving[0]).value * (x / x[0]) ** 0.25
     axes.plot(x, printed, color=ORANGE, linestyle="--", label="as printed, E0^(1/4)")
-    axes.set(xscale="log", yscale="log", xlabel="E0", ylabel="width of the uncaptured peak of ln(E1/E0)")
+    axes.set(
+        xscale="log", yscale="log", xlabel="E0", ylabel="width of the uncaptured peak of ln(E1/E0)"
+    )
     axes.legend(fontsize=8)
 
 
@@ -279,10 +343,15 @@ def convergence(panels: Panels, *samples: Sample) -> None:
     """Draw the mean of s, p_nc and the unbiased mean against E0."""
     energies = [sample.run.energy for sample in samples]
     scene = load("moving-cap")
-    prediction, unbiased = theory.predict(scene, 15), theory.unbiased_mean(scene)
+    prediction = theory.predict(scene, 15)
+    unbiased = theory.unbiased_mean(scene)
     rows: tuple[tuple[str, list[Mean], float], ...] = (
         ("mean of ln(E1/E0)", [mean(s.gain) for s in samples], float(prediction.m1)),
-        ("share never captured", [share(s.never_captured) for s in samples], float(prediction.p_nc)),
+        (
+            "share never captured",
+            [share(s.never_captured) for s in samples],
+            float(prediction.p_nc),
+        ),
         ("mean of exp(-s/2)", [mean(np.exp(-s.gain / 2)) for s in samples], float(unbiased)),
     )
     for panel, (label, measured, truth) in zip(panels, rows, strict=True):
@@ -335,7 +404,9 @@ def frozen(panels: Panels) -> None:
 
 
 Samples = Mapping[str, Sample]
-MAIN_RUN, MANY_CYCLES, MANY_SLOWER = "moving-cap@1e7", "moving-cap@1e7x30", "moving-cap@1e5x30"
+MAIN_RUN = "moving-cap@1e7"
+MANY_CYCLES = "moving-cap@1e7x30"
+MANY_SLOWER = "moving-cap@1e5x30"
 PEAKS = LADDER[3:6]  # the moving caps whose widths are fitted
 
 
@@ -363,8 +434,8 @@ ALL = (
     Picture(
         "M2",
         "The cycles, with the direction of time; colours mark the phase. Left: the plane of eq. "
-        "(cycle). Middle and right: the plane of sec. 3.5, in which energy grows when the loop bounds"
-        " an area (M12). The moving cap's runs clockwise, as its caption in the paper says.",
+        "(cycle). Middle and right: the plane of sec. 3.5, in which energy grows when the loop"
+        " bounds an area (M12). The moving cap's runs clockwise, as its caption in the paper says.",
         loops,
         partial(new_figure, 9.6, 3.4, 1, 3),
     ),
@@ -376,8 +447,8 @@ ALL = (
     ),
     Picture(
         "M7",
-        "Width of the uncaptured peak against energy, with fitted powers, and the power as printed. "
-        "Error bars are smaller than the marks.",
+        "Width of the uncaptured peak against energy, with fitted powers, and the power as"
+        " printed. Error bars are smaller than the marks.",
         widths,
         partial(new_figure, 5.4, 3.8),
         (*PEAKS, *ERGODIC[1:]),
@@ -393,17 +464,17 @@ ALL = (
     ),
     Picture(
         "X1",
-        "Energies after one cycle, fixed cap. In theory (orange) the never captured share one energy,"
-        " dashed. The other curve is the theory at this energy, with diffusion and lags from frozen tables"
-        " and nothing fitted.",
+        "Energies after one cycle, fixed cap. In theory (orange) the never captured share one"
+        " energy, dashed. The other curve is the theory at this energy, with diffusion and lags"
+        " from frozen tables and nothing fitted.",
         energies,
         partial(with_residuals, 2),
         (ACW, CW),
     ),
     Picture(
         "X2",
-        "Energies after one cycle, moving cap; as above. The orange density is infinite at its right"
-        " end, the caustic of N5; drawn is its mean over one bar.",
+        "Energies after one cycle, moving cap; as above. The orange density is infinite at its"
+        " right end, the caustic of N5; drawn is its mean over one bar.",
         energies,
         partial(with_residuals, 2),
         ("moving-cap@1e6", MAIN_RUN),
@@ -417,27 +488,29 @@ ALL = (
     ),
     Picture(
         "X4",
-        "Many cycles: the centre and, on a logarithmic axis, the tails, with sums drawn from the theory at "
-        "this energy.",
+        "Many cycles: the centre and, on a logarithmic axis, the tails, with sums drawn from the"
+        " theory at this energy.",
         sums,
         partial(new_figure, 9.6, 6.4, 2, 2),
         (MANY_SLOWER,),
         (MANY_CYCLES,),
     ),
-    Picture("X5", "c = 0: one narrow peak.", energies, partial(with_residuals, 1), ("ergodic@1e7",)),
+    Picture(
+        "X5", "c = 0: one narrow peak.", energies, partial(with_residuals, 1), ("ergodic@1e7",)
+    ),
     Picture(
         "X6",
-        "Tilted and upright stem: energies of the never captured, each counted from its own theory's "
-        "log E_nc. Parabolic orbits between the upright sides spread them far.",
+        "Tilted and upright stem: energies of the never captured, each counted from its own"
+        " theory's log E_nc. Parabolic orbits between the upright sides spread them far.",
         stems,
         partial(new_figure, 9.6, 3.4, 1, 2),
         ("moving-cap@1e6", "untilted@1e6"),
     ),
     Picture(
         "X7",
-        "A loop without an interior that accelerates. Left: one parameter moves along the arc and back; "
-        "captures (blue) and their releases (orange), at the same V_ell/V_cap, lie at different V_cap/V. "
-        "Right: energies after one cycle, as in X1.",
+        "A loop without an interior that accelerates. Left: one parameter moves along the arc and"
+        " back; captures (blue) and their releases (orange), at the same V_ell/V_cap, lie at"
+        " different V_cap/V. Right: energies after one cycle, as in X1.",
         retraced,
         partial(new_figure, 9.6, 3.6, 1, 2),
         ("retraced-arc@1e6",),
@@ -457,8 +530,8 @@ ALL = (
     ),
     Picture(
         "L4",
-        "Release: how far nu at release is from nu at capture, against 1/v (grey: single particles), "
-        "and its distribution in units of 1/v.",
+        "Release: how far nu at release is from nu at capture, against 1/v (grey: single"
+        " particles), and its distribution in units of 1/v.",
         release,
         partial(new_figure, 9.6, 3.4, 1, 2),
         LADDER[1:6],

@@ -1,20 +1,22 @@
-"""What frozen tables tell of finite energy: how walls' kicks diffuse, how far particles near capture lag.
+"""What frozen tables tell of finite energy: diffusion by the walls' kicks, and capture lags.
 
-At each phase of a cycle the table is stopped and its walls made to sway so little that only the sum of their
-kicks is seen, each wall in proportion to its speed there. At speed 1 that gives
+At each phase of a cycle the table is stopped and its walls made to sway so little that only the sum
+of their kicks is seen, each wall in proportion to its speed there. At speed 1 that gives
 
-- diffusion: what kicks of each of theory's MEMORIES add to the variance per path length of the sum, over hits
-  of the chaotic zone, of -4 c u, with c the cosine of incidence and u the wall's speed. Walls sway once in
-  PATH; products of kicks, over those of the walls' speeds, are the correlations at lags of up to LAGS steps,
-  to which positive sums of exponentials are fitted;
-- lag and square, at each of SPEEDS: a chord at the island's edge is turned until it first passes the mouth,
-  which widens meanwhile as fast as it does there, and is followed for TAIL further. The sum of kicks,
-  less the chaotic zone's mean of it, has the mean `lag`; its mean square, less diffusion's, is `square`;
-- depletion, at each of SPEEDS: what diffusion loses because a mouth that moves lets particles wait in the
-  cap for less long than one at rest.
+- diffusion: what kicks of each of theory's MEMORIES add to the variance per path length of the sum,
+  over hits of the chaotic zone, of -4 c u, with c the cosine of incidence and u the wall's speed.
+  Walls sway once in PATH; products of kicks, over those of the walls' speeds, are the correlations
+  at lags of up to LAGS steps, to which positive sums of exponentials are fitted;
+- lag and square, at each of SPEEDS: a chord at the island's edge is turned until it first passes
+  the mouth, which widens meanwhile as fast as it does there, and is followed for TAIL further. The
+  sum of kicks, less the chaotic zone's mean of it, has the mean `lag`; its mean square, less
+  diffusion's, is `square`;
+- depletion, at each of SPEEDS: what diffusion loses because a mouth that moves lets particles wait
+  in the cap for less long than one at rest.
 
-All are of tables at rest: nothing is taken from a moving one, or fitted to it. `theory.finite_energy` reads
-them, `theory/equations.md` says what follows. `python -m mushrooms.audit.frozen` measures them anew.
+All are of tables at rest: nothing is taken from a moving one, or fitted to it.
+`theory.finite_energy` reads them, `theory/equations.md` says what follows. `python -m
+mushrooms.audit.frozen` measures them anew.
 """
 
 import json
@@ -34,10 +36,17 @@ from mushrooms.audit.tolerances import FloatArray, Mean, mean
 from scene import Fourier, Horizon, Mushroom, State
 from scene.files.writer import write_file
 from scene.geometry import TableAt, table_at
-from scene.laws import value
 from scene.named import scene_named
-from scene.tables import laws
-from theory.finite_energy.rates import FILE, MEMORIES, N_PHASES, PHASES, SPEEDS, Rates, kick_rates, pace
+from theory.finite_energy.rates import (
+    FILE,
+    MEMORIES,
+    N_PHASES,
+    PHASES,
+    SPEEDS,
+    Rates,
+    kick_rates,
+    pace,
+)
 from theory.volumes import volumes_at
 
 MEASURED = (
@@ -50,13 +59,18 @@ MEASURED = (
     "fixed-cap-other-legs",
     "fixed-cap-irregular",
 )
-PATH, STEP, LAGS = 4000.0, 8.0, 80
+PATH = 4000.0
+STEP = 8.0
+LAGS = 80
 FIRM = 30.0
 SWAY = 1e-5  # of the parameter that moves fastest [length, or none]: a relative error of this order
 TAIL = 250.0  # some five times the longest memory of a table
 SWAY_PERIOD = 200.0  # in units of TAIL, for the lag: the walls' speed is then constant to 5e-4
-N_DIFFUSING, N_LAGGING, N_WAITING = 2000, 2000, 3000
-FINER = {"moving-cap": 4.0}  # times as many particles: with fewer, diffusion was by chance 1.5 % too small
+N_DIFFUSING = 2000
+N_LAGGING = 2000
+N_WAITING = 3000
+# Times as many particles: with fewer, diffusion was by chance 1.5 % too small.
+FINER = {"moving-cap": 4.0}
 N_GROUPS = 8  # of particles, by which errors are found
 AT_ONCE = 20_000  # turns of chords
 CROWDED = 4  # power by which places within the mouth are crowded at its rim, where waits are long
@@ -78,8 +92,11 @@ class Passages(NamedTuple):
 
 
 def swaying(scene: Mushroom, t: float, period: float) -> tuple[Mushroom, float]:
-    """Return time t's table with walls that sway in proportion to their speeds, and that proportion."""
-    now = {name: [float(value(fp, law, t, k)) for k in (0, 1)] for name, law in laws(scene).items()}
+    """Return the table of time t with walls that sway in proportion to their speeds.
+
+    The proportion is returned too.
+    """
+    now = {name: [float(law.value(fp, t, k)) for k in (0, 1)] for name, law in scene.laws.items()}
     size = SWAY / max(abs(rate) for _, rate in now.values())
     moved: dict[str, Any] = {
         name: Fourier(mean=at, period=period, sin=(size * rate,)) if rate else at
@@ -89,7 +106,7 @@ def swaying(scene: Mushroom, t: float, period: float) -> tuple[Mushroom, float]:
 
 
 def diffusion(scene: Mushroom, t: float, n: int, seed: int) -> list[Mean]:
-    """Return what kicks of each memory add to the chaotic zone's variance per path length at time t.
+    """Return what kicks of each memory add to the zone's variance per path length at time t.
 
     Args:
         scene: a mushroom some of whose walls move at t.
@@ -98,12 +115,15 @@ def diffusion(scene: Mushroom, t: float, n: int, seed: int) -> list[Mean]:
         seed: of their starts.
 
     Returns:
-        A number for each of MEMORIES [length / time^2], with the standard error of their sum's share.
+        A number for each of MEMORIES [length / time^2], with the standard error of their sum's
+        share.
     """
     table, share = swaying(scene, t, PATH)
     n_steps = round(PATH / STEP)
     phases = np.arange(1, n_steps) / n_steps
-    done = fast.simulate(table, n_particles=n, energy=0.5, seed=seed, threads=1, phases=phases.tolist())
+    done = fast.simulate(
+        table, n_particles=n, energy=0.5, seed=seed, threads=1, phases=phases.tolist()
+    )
     is_free = (done.outcome == 0) & (done.wall_counts[:, 2:].sum(axis=1) > 0)
     energies = np.column_stack([done.phase_energies[is_free, 0], done.energy[is_free]])
     kicks = np.diff(np.log(2 * energies), axis=1, prepend=0.0) / share
@@ -117,12 +137,13 @@ def diffusion(scene: Mushroom, t: float, n: int, seed: int) -> list[Mean]:
 
 
 def _spectrum(kicks: FloatArray, speed: FloatArray) -> FloatArray:
-    """Return the diffusion by kicks of each of MEMORIES that gives the correlations seen, none negative.
+    """Return the diffusion by kicks of each of MEMORIES for the correlations seen, none negative.
 
-    What all lags add up to counts FIRM times as much as a lag: correlations need not be sums of exponentials,
-    but fast walls see nothing else of them.
+    What all lags add up to counts FIRM times as much as a lag: correlations need not be sums of
+    exponentials, but fast walls see nothing else of them.
     """
-    n_steps, m = kicks.shape[1], np.array(MEMORIES)
+    n_steps = kicks.shape[1]
+    m = np.array(MEMORIES)
     seen = [
         float((kicks[:, : n_steps - k] * kicks[:, k:]).mean(axis=0).sum())
         / float((speed[: n_steps - k] * speed[k:]).sum())
@@ -136,7 +157,10 @@ def _spectrum(kicks: FloatArray, speed: FloatArray) -> FloatArray:
 
 
 def step_correlations(m: FloatArray) -> FloatArray:
-    """Return the correlations of kicks over STEP, at lags of 0 to LAGS - 1 steps, that a unit of each has."""
+    """Return the correlations of kicks over STEP that a unit of each has.
+
+    Lags are 0 to LAGS - 1 steps.
+    """
     lags = np.arange(LAGS)[:, None] * STEP
     found = m * (np.cosh(STEP / m) - 1) * np.exp(-lags / m)
     found[0] = STEP - m * (1 - np.exp(-STEP / m))
@@ -170,14 +194,16 @@ def lag(
 def passages(
     scene: Mushroom, now: TableAt, t: float, speed: float, n: int, random: np.random.Generator
 ) -> Passages:
-    """Turn chords of the island's edge until each passes the mouth, which widens as fast as it moves.
+    """Turn chords of the island's edge until each passes the mouth, as fast as the mouth widens.
 
-    sigma is spread over the phase's cell: where a turn is resonant the lag at a single sigma diverges.
+    sigma is spread over the phase's cell: where a turn is resonant the lag at a single sigma
+    diverges.
     """
     cell = np.linspace(-0.5, 0.5, 9)
     tables = [table_at(fp, scene, t + x * scene.period / N_PHASES) for x in cell]
     sigma = np.interp(random.uniform(-0.5, 0.5, n), cell, [float(one.w / one.r) for one in tables])
-    sigma = sigma[sigma < 1.0]  # a mouth that rests wide open leaves no island, and its rim does not turn
+    # A mouth that rests wide open leaves no island, and its rim does not turn.
+    sigma = sigma[sigma < 1.0]
     return turned(now, sigma, sigma, widening(now) / speed, random, math.inf)
 
 
@@ -194,19 +220,24 @@ def turned(
     random: np.random.Generator,
     longest: float,
 ) -> Passages:
-    """Turn chords at distances sigma r from the centre until each passes the mouth, or for the longest path.
+    """Turn chords at distances sigma r from the centre until each passes the mouth, if it does.
 
-    A chord has its foot at an angle alpha from the base. Unfolded over the base, it turns by 2 acos(sigma)
-    from one arc hit to the next, and meets it at sigma r / cos alpha: in the mouth once |cos alpha| > sigma /
-    nu, where nu exceeds `mouth` by `rate` times the path so far. Its start is uniform along the chord and in
-    alpha. Distances from the centre are in units of the mouth: all pass the mouth of one frozen table.
+    A chord has its foot at an angle alpha from the base. Unfolded over the base, it turns by 2
+    acos(sigma) from one arc hit to the next, and meets it at sigma r / cos alpha: in the mouth once
+    |cos alpha| > sigma / nu, where nu exceeds `mouth` by `rate` times the path so far. Its start is
+    uniform along the chord and in alpha. Distances from the centre are in units of the mouth: all
+    pass the mouth of one frozen table.
     """
     n = len(sigma)
-    half, turn = np.sqrt(1 - sigma**2), 2 * np.arccos(sigma)
+    half = np.sqrt(1 - sigma**2)
+    turn = 2 * np.arccos(sigma)
     alpha = random.uniform(0, 2 * math.pi, n)
     begin = -2 * now.r * half * random.random(n)  # path at which the chord begins
-    path, arcs, columns = np.full(n, longest), np.zeros(n), np.zeros((n, 3))
-    turning, n_turns = np.arange(n), 0
+    path = np.full(n, longest)
+    arcs = np.zeros(n)
+    columns = np.zeros((n, 3))
+    turning = np.arange(n)
+    n_turns = 0
     while len(turning):
         # The few that are left turn many times at once.
         k = n_turns + np.arange(max(1, AT_ONCE // len(turning)))
@@ -217,19 +248,26 @@ def turned(
             place = begin[turning, None] + now.r * (c * (1 + 2 * k) - s * sin / cos)
         ratio = s / (mouth[turning, None] + rate * np.maximum(place, 0.0))
         passes = (place > 0) & (np.abs(cos) > ratio)
-        is_done, first = passes.any(axis=1), passes.argmax(axis=1)
-        those, at = turning[is_done], (np.flatnonzero(is_done), first[is_done])
+        is_done = passes.any(axis=1)
+        first = passes.argmax(axis=1)
+        those = turning[is_done]
+        at = (np.flatnonzero(is_done), first[is_done])
         path[those] = np.minimum(place[at], longest)
         arcs[those] = -4 * half[those] * k[at[1]]
         columns[those] = np.column_stack([now.w * ratio[at] / cos[at], -sin[at], -np.abs(cos[at])])
         n_turns = int(k[-1]) + 1
-        turning = turning[~is_done & (begin[turning] + 2 * now.r * half[turning] * n_turns < longest)]
+        turning = turning[
+            ~is_done & (begin[turning] + 2 * now.r * half[turning] * n_turns < longest)
+        ]
     states = [State(0.0, x, 0.0, vx, vy) for x, vx, vy in columns.tolist()]
     return Passages(path, arcs, states)
 
 
 def swayed(wait: FloatArray, path: float) -> FloatArray:
-    """Return what a wait counts for where the rate of kicks sways once in a path: all of a short one."""
+    """Return what a wait counts for where the rate of kicks sways once in a path.
+
+    A short wait counts for all.
+    """
     omega = 2 * math.pi / path
     angle = omega * np.minimum(wait, path)
     found: FloatArray = (1 - angle / (2 * math.pi)) * np.sin(angle) / omega
@@ -239,11 +277,11 @@ def swayed(wait: FloatArray, path: float) -> FloatArray:
 def depletion(scene: Mushroom, t: float, speed: float, n: int, seed: int) -> Mean:
     """Return by how much diffusion is less than a table at rest has, near time t [length / time^2].
 
-    In the cap a particle misses the zone's kicks, at the rate f: what it gathers by that is 2 f^2 times the
-    mean path it has been there, over the zone. Seen backwards from capture the mouth widens, and that path is
-    shorter than it would be with the mouth at rest; on release the same holds forwards. Correlations of kicks
-    are seen over LAGS steps only, and so are waits at rest; a cycle's walls sway once in it. The same chords
-    meet both mouths.
+    In the cap a particle misses the zone's kicks, at the rate f: what it gathers by that is 2 f^2
+    times the mean path it has been there, over the zone. Seen backwards from capture the mouth
+    widens, and that path is shorter than it would be with the mouth at rest; on release the same
+    holds forwards. Correlations of kicks are seen over LAGS steps only, and so are waits at rest; a
+    cycle's walls sway once in it. The same chords meet both mouths.
 
     Args:
         scene: a mushroom whose mouth moves at t.
@@ -252,11 +290,14 @@ def depletion(scene: Mushroom, t: float, speed: float, n: int, seed: int) -> Mea
         n: number of particles.
         seed: of their chords.
     """
-    now, chaotic = table_at(fp, scene, t), float(volumes_at(fp, scene, t).v_cha)
-    nu, x = float(now.w / now.r), np.random.default_rng([seed, 1]).random(n)
+    now = table_at(fp, scene, t)
+    chaotic = float(volumes_at(fp, scene, t).v_cha)
+    nu = float(now.w / now.r)
+    x = np.random.default_rng([seed, 1]).random(n)
     sigma = nu * (1 - x**CROWDED)
     weight = 4 * math.pi * now.r**2 * np.sqrt(1 - sigma**2) * nu * CROWDED * x ** (CROWDED - 1)
-    path, mouth = speed * scene.period, np.full(n, nu)
+    path = speed * scene.period
+    mouth = np.full(n, nu)
     moving, resting = (
         turned(now, sigma, mouth, rate, np.random.default_rng([seed, 2]), longest).path
         for rate, longest in ((widening(now) / speed, path), (0.0, LAGS * STEP))
@@ -265,7 +306,9 @@ def depletion(scene: Mushroom, t: float, speed: float, n: int, seed: int) -> Mea
     return mean(2 * missed**2 / chaotic * weight * (swayed(moving, path) - resting))
 
 
-def measured(scene: Mushroom, *, phases: FloatArray = PHASES, n: float = 1.0, seed: int = SEED) -> Rates:
+def measured(
+    scene: Mushroom, *, phases: FloatArray = PHASES, n: float = 1.0, seed: int = SEED
+) -> Rates:
     """Measure a cycle's rates.
 
     Args:
@@ -275,7 +318,12 @@ def measured(scene: Mushroom, *, phases: FloatArray = PHASES, n: float = 1.0, se
         seed: of all random numbers.
     """
     rows = [
-        _row(scene, float(phase) * scene.period, n, np.random.default_rng([seed, round(phase * 1000)]))
+        _row(
+            scene,
+            float(phase) * scene.period,
+            n,
+            np.random.default_rng([seed, round(phase * 1000)]),
+        )
         for phase in phases
     ]
     values, errors = np.moveaxis(np.array(rows), 2, 0)
@@ -284,9 +332,12 @@ def measured(scene: Mushroom, *, phases: FloatArray = PHASES, n: float = 1.0, se
 
 
 def _row(scene: Mushroom, t: float, n: float, random: np.random.Generator) -> list[Mean]:
-    unit, now = float(pace(scene, t)), table_at(fp, scene, t)
+    unit = float(pace(scene, t))
+    now = table_at(fp, scene, t)
     first, second = random.integers(2**63, size=2).tolist()
-    n_diffusing, n_lagging, n_waiting = (int(n * size) for size in (N_DIFFUSING, N_LAGGING, N_WAITING))
+    n_diffusing, n_lagging, n_waiting = (
+        int(n * size) for size in (N_DIFFUSING, N_LAGGING, N_WAITING)
+    )
     spread = diffusion(scene, t, n_diffusing, first)
     rate = sum(one.value for one in spread)
     lags = [(Mean(0.0, 0.0), Mean(0.0, 0.0))] * len(SPEEDS)
@@ -301,13 +352,18 @@ def _row(scene: Mushroom, t: float, n: float, random: np.random.Generator) -> li
 
 
 def main(names: Sequence[str] = ()) -> None:
-    """Measure the rates of some of the audit's cycles, of all by default, and put them in theory's table."""
+    """Measure the rates of some of the audit's cycles and put them in theory's table.
+
+    All are measured by default.
+    """
     short = np.vectorize(lambda number: float(f"{number:.{DIGITS}g}"))
     for name in names or MEASURED:
         scene = scene_named(name)
         assert isinstance(scene, Mushroom)
         n = FINER.get(name, 1.0)
-        kept = {key: short(column).tolist() for key, column in measured(scene, n=n)._asdict().items()}
+        kept = {
+            key: short(column).tolist() for key, column in measured(scene, n=n)._asdict().items()
+        }
         text = {
             "command": "python -m mushrooms.audit.frozen",
             "seed": SEED,

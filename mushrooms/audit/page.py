@@ -45,7 +45,8 @@ SIGNS = {
     "refuted": ("✗", "bad"),
     "indeterminate": ("?", "open"),
 }
-M1, P_NC = "mean of log E1/E0", "share never captured"
+M1 = "mean of log E1/E0"
+P_NC = "share never captured"
 # Run, what is measured of it, and what the paper prints: its simulation, and its theory.
 MAIN = (
     ("fixed-cap-anticlockwise@1e9", M1, "0.0463 ± 0.0027", "0.044926"),
@@ -107,12 +108,17 @@ def _finding(claim: Claim, finding: Finding) -> Data:
 
 
 def _check(check: Check) -> Data:
-    numbers = {name: _number(getattr(check, name)) for name in ("value", "error", "band", "sees", "power")}
+    numbers = {
+        name: _number(getattr(check, name)) for name in ("value", "error", "band", "sees", "power")
+    }
     return check._asdict() | numbers | {"pull": pull(check)}
 
 
 def pull(check: Check) -> float | None:
-    """Return how many standard errors a value is from the number expected; None where nothing is random."""
+    """Return how many standard errors a value is from the number expected.
+
+    None where nothing is random.
+    """
     if check.value is None or not check.error:
         return None
     try:
@@ -191,19 +197,24 @@ def to_html(data: Data, samples: figures.Samples) -> str:
 def headline(samples: figures.Samples) -> list[Data]:
     """Return the first screen: the paper's main numbers as printed, as predicted and as simulated.
 
-    `theory_there` is the limit of infinite energy as printed, `limit` the same by our theory. `predicted` is
-    by our theory at the run's energy with nothing fitted, `found` by our simulation. `pull` is found less
-    predicted, in standard errors.
+    `theory_there` is the limit of infinite energy as printed, `limit` the same by our theory.
+    `predicted` is by our theory at the run's energy with nothing fitted, `found` by our simulation.
+    `pull` is found less predicted, in standard errors.
     """
     rows = []
     for run, quantity, simulated_there, theory_there in MAIN:
         if run not in samples:
             continue
-        limit, here = theory.predict(scene_of(samples[run].run)), predicted(samples[run])
+        limit = theory.predict(scene_of(samples[run].run))
+        here = predicted(samples[run])
         if quantity == M1:
-            value, expected, found = float(limit.m1), here.mean_s, mean(samples[run].gain)
+            value = float(limit.m1)
+            expected = here.mean_s
+            found = mean(samples[run].gain)
         else:
-            value, expected, found = float(limit.p_nc), here.p_nc, share(samples[run].never_captured)
+            value = float(limit.p_nc)
+            expected = here.p_nc
+            found = share(samples[run].never_captured)
         rows.append(
             {
                 "run": run,
@@ -220,7 +231,7 @@ def headline(samples: figures.Samples) -> list[Data]:
 
 
 def _place(finding: Data) -> tuple[list[int], str, int]:
-    """Return where in the paper a finding belongs: its first section, then its letter and number."""
+    """Return where in the paper a finding belongs: first section, then letter and number."""
     sections = re.findall(r"sec[s]?\. (\d(?:\.\d)*)", finding["where"])
     first = [int(part) for part in sections[0].split(".")] if sections else [9]
     return first, finding["id"][0], int(finding["id"][1:])
@@ -246,7 +257,7 @@ def expected_text(check: Data) -> str:
 
 
 def power_text(check: Data) -> str:
-    """Return what a check is worth: the smallest departure seen, and its named alternative's chances."""
+    """Return what a check is worth: the smallest departure seen, and its rival's chances."""
     seen = "" if check["sees"] is None else f"{check['sees']:.1g}"
     if check["power"] is None:
         return seen
@@ -263,15 +274,20 @@ def to_text(data: Data) -> str:
     """Return the summary: one line per claim, then what did not come out as expected."""
     lines = []
     for finding in data["findings"]:
-        n_held = sum(check["holds"] is True for check in finding["checks"] if check["form"] != "printed")
+        n_held = sum(
+            check["holds"] is True for check in finding["checks"] if check["form"] != "printed"
+        )
         n = sum(check["form"] != "printed" for check in finding["checks"])
         mark = " " if finding["as_expected"] else "!"
-        lines.append(f"{mark} {finding['id']:<4}{finding['verdict']:<28}{n_held:>3}/{n:<4}{finding['where']}")
+        lines.append(
+            f"{mark} {finding['id']:<4}{finding['verdict']:<28}{n_held:>3}/{n:<4}{finding['where']}"
+        )
         if not finding["as_expected"]:
             lines.append(f"      expected: {finding['expected']}")
             # Each check that does not come out as its form asks: what is printed must fail.
             lines += [
-                f"      {check['form']}: {check['what']}: {figures_text(check)}, expected {check['expected']}"
+                f"      {check['form']}: {check['what']}: {figures_text(check)}, expected"
+                f" {check['expected']}"
                 for check in finding["checks"]
                 if (check["holds"] is not True) != (check["form"] == "printed")
             ]
@@ -280,7 +296,7 @@ def to_text(data: Data) -> str:
     lines += [
         "",
         f"{n_right} of {len(data['findings'])} claims have their expected verdict."
-        f" {alarms['tests']} comparisons with random data at {alarms['standard_errors']:.2f} standard errors:"
-        f" a false alarm in fewer than {alarms['bound']:.1e} of audits.",
+        f" {alarms['tests']} comparisons with random data at {alarms['standard_errors']:.2f}"
+        f" standard errors: a false alarm in fewer than {alarms['bound']:.1e} of audits.",
     ]
     return "\n".join(lines) + "\n"

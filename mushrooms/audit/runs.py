@@ -1,8 +1,8 @@
-"""The simulations that the audit rests on: scene, energy and number of particles, and what they did.
+"""The simulations that the audit rests on: scene, energy, number of particles, what they did.
 
-A run has a seed of its own, derived from the audit's seed and the run's name, and its particles are those
-that this seed numbers. So a quick audit follows the first particles of a full one, and a run comes to the
-same bits whether it is followed at once, in parts or on another machine.
+A run has a seed of its own, derived from the audit's seed and the run's name, and its particles are
+those that this seed numbers. So a quick audit follows the first particles of a full one, and a run
+comes to the same bits whether it is followed at once, in parts or on another machine.
 """
 
 import hashlib
@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from mpmath import fp
 
+from scene.laws import Law
 from scene.named import scene_named
 from scene.tables import Scene
 
@@ -98,8 +100,8 @@ _ALL = (
     # Nothing exponential: many cycles at speeds that grow slowly (C5).
     Simulation("ergodic", 1e4, 800, 4_000, n_cycles=120),
     Simulation("moving-cap-trivial", 1e4, 800, 4_000, n_cycles=120),
-    # Many cycles cost most: energies, and with them collisions, grow exponentially. Sec. 4.2 at its size, for
-    # n = 10 and n = 30: some 1.8e11 collisions.
+    # Many cycles cost most: energies, and with them collisions, grow exponentially. Sec. 4.2 at its
+    # size, for n = 10 and n = 30: some 1.8e11 collisions.
     Simulation("moving-cap", 1e5, 500, 500, n_cycles=30),
     Simulation("moving-cap", 1e7, 0, 25_000, n_cycles=30),
 )
@@ -174,13 +176,21 @@ class Sample(NamedTuple):
 
     @property
     def never_captured(self) -> BoolArray:
-        """Return, for each that takes part, whether the first cycle passes uncaptured; p_nc is the share."""
+        """Return, for each that takes part, whether the first cycle passes uncaptured.
+
+        P_nc is the share.
+        """
         return np.asarray(~self.captured[self.takes_part])
 
     @property
     def first_capture(self) -> tuple[FloatArray, FloatArray]:
-        """Return begin and end (n,) of each one's first capture interval in the first cycle; nan for none."""
-        begin, end = (np.fmin.reduce(t[:, 0], axis=1, initial=np.nan) for t in (self.t_in, self.t_out))
+        """Return begin and end (n,) of each one's first capture interval in the first cycle.
+
+        Nan for none.
+        """
+        begin, end = (
+            np.fmin.reduce(t[:, 0], axis=1, initial=np.nan) for t in (self.t_in, self.t_out)
+        )
         return begin, end
 
     def change(self, which: BoolArray, first: int, last: int) -> FloatArray:
@@ -205,7 +215,8 @@ def draw(
     """Follow a run's particles, and keep what the audit looks at of those followed to the end.
 
     Args:
-        simulate: `fast.simulate`, or another with its signature; it may know the particles from before.
+        simulate: `fast.simulate`, or another with its signature; it may know the particles from
+            before.
         run: what to simulate.
         size: quick or full.
         seed: the audit's.
@@ -225,7 +236,8 @@ def draw(
     energies = ensemble.cycle_energies
     followed = (ensemble.outcome == 0) & np.all(np.isfinite(energies) & (energies > 0), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        s, phase_s = np.log(energies / ensemble.energy0), np.log(ensemble.phase_energies / ensemble.energy0)
+        s = np.log(energies / ensemble.energy0)
+        phase_s = np.log(ensemble.phase_energies / ensemble.energy0)
     return Sample(
         run=run,
         s=s[followed],
@@ -243,3 +255,8 @@ def draw(
         seconds=ensemble.seconds * ensemble.threads,
         sha256=ensemble.sha256(),
     )
+
+
+def at_knots(law: Law) -> list[float]:
+    """Return the values of a bang-bang law at its knots, in order of time."""
+    return [float(law.value(fp, float(time))) for time in law.breakpoints()[::2]]

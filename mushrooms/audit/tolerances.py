@@ -1,13 +1,14 @@
-"""Acceptance: how far a measured number may be from what is claimed, and how often chance breaks that.
+"""Acceptance: how far a number may be from what is claimed, and how often chance breaks that.
 
-An audit makes fewer than MAX_TESTS comparisons with random data. Each is allowed to fail a true claim
-with probability LEVEL; so a whole audit raises a false alarm with probability below FAMILY_LEVEL
-(Bonferroni's bound: no independence is assumed). Errors are taken to be normal: means over thousands of
-particles are, and so are shares when a few dozen particles or more lie on either side.
+An audit makes fewer than MAX_TESTS comparisons with random data. Each is allowed to fail a true
+claim with probability LEVEL; so a whole audit raises a false alarm with probability below
+FAMILY_LEVEL (Bonferroni's bound: no independence is assumed). Errors are taken to be normal: means
+over thousands of particles are, and so are shares when a few dozen particles or more lie on either
+side.
 
-A comparison that holds says little unless it could have failed. So each tells the departure that it would
-refute with probability SEEN; and where a rival of the claim has a name, how likely that rival is refuted: the
-power of the test against it.
+A comparison that holds says little unless it could have failed. So each tells the departure that it
+would refute with probability SEEN; and where a rival of the claim has a name, how likely that rival
+is refuted: the power of the test against it.
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ class Mean(NamedTuple):
     def over(self, other: Mean) -> Mean:
         """Return the ratio to an independent value, its error to first order."""
         ratio = self.value / other.value
-        return Mean(ratio, ratio * float(np.hypot(self.error / self.value, other.error / other.value)))
+        return Mean(
+            ratio, ratio * float(np.hypot(self.error / self.value, other.error / other.value))
+        )
 
 
 def mean(values: npt.ArrayLike) -> Mean:
@@ -63,7 +66,10 @@ def mean(values: npt.ArrayLike) -> Mean:
 
 
 def share(flags: npt.ArrayLike) -> Mean:
-    """Return the share of true flags and its standard error, which is never 0 (Agresti and Coull 1998)."""
+    """Return the share of true flags and its standard error.
+
+    The error is never 0 (Agresti and Coull 1998).
+    """
     x = np.asarray(flags, dtype=bool)
     if not x.size:
         return Mean(np.nan, np.nan)
@@ -79,7 +85,9 @@ def spread(values: npt.ArrayLike) -> Mean:
     centred = x - x.mean()
     variance = float(np.mean(centred**2))
     fourth = float(np.mean(centred**4)) - variance**2
-    return Mean(float(x.std(ddof=1)), float(np.sqrt(max(fourth, 0.0) / x.size / max(4 * variance, 1e-300))))
+    return Mean(
+        float(x.std(ddof=1)), float(np.sqrt(max(fourth, 0.0) / x.size / max(4 * variance, 1e-300)))
+    )
 
 
 def half_unit(printed: str) -> float:
@@ -132,12 +140,15 @@ def close(
 
 
 def _seen(reach: float, error: float) -> float | None:
-    """Return the departure that a reach misses only with probability 1 - SEEN; None for an error of nan."""
+    """Return the departure that a reach misses only with probability 1 - SEEN.
+
+    None for an error of nan.
+    """
     return reach + float(norm.isf(1 - SEEN)) * error if np.isfinite(reach + error) else None
 
 
 def power(departure: float, reach: float, error: float) -> float | None:
-    """Return how likely a normal value is further than `reach` from where it is not, but `departure` off."""
+    """Return how likely a normal value, off by `departure`, is further than `reach`."""
     if not np.isfinite(departure + reach + error):
         return None
     if error == 0:
@@ -181,7 +192,7 @@ def critical_gap(n: int) -> float:
 
 
 def seen_late(cdf: Cdf, times: FloatArray, wait: float) -> float:
-    """Return how far the distribution of times moves, at most, if each may be seen by `wait` later."""
+    """Return how far the distribution of times moves at most if each is seen by `wait` later."""
     grid = np.linspace(times.min(), times.max(), 2000)
     return float(np.max(cdf(grid) - cdf(grid - wait)))
 
@@ -221,7 +232,8 @@ def fits(
     n = len(values)
     if n < 2:
         return Check(what, None, "a sample", n_tests=1, note="no particles")
-    (gap, p), reach = ks_1samp(values, cdf, method="exact"), critical_gap(n) + band
+    gap, p = ks_1samp(values, cdf, method="exact")
+    reach = critical_gap(n) + band
     holds = None if reach >= scale else bool(gap <= reach)
     more = f"; {note}" if note else ""
     text = f"Kolmogorov's distance, n = {n}, p = {p:.2g} without a band{more}"
@@ -241,7 +253,7 @@ def fits(
 
 
 def _power_of_gap(values: FloatArray, cdf: Cdf, other: Cdf, reach: float) -> float:
-    """Return how likely a sample of `other` is further than `reach` from `cdf` at one place, at least."""
+    """Return at least how likely a sample of `other` is further than `reach` from `cdf`."""
     lowest, highest = np.quantile(values, (0.001, 0.999)).tolist()
     places = np.linspace(lowest, highest, 2001)
     g = np.clip(other(places), 0.0, 1.0)

@@ -1,10 +1,11 @@
 """Energies of an ensemble after one cycle and from cycle to cycle, with the theory.
 
-The data are s = ln(E/E0) of the particles that take part, as (n, K) arrays: n particles after each of K
-cycles. A run too large for memory gives them block by block. Below a histogram stands its difference from
-the theory at this energy. For scenes without measured rates the limit of high energies is drawn. All curves
-of theory in one panel are of one energy. A density is drawn as its mean over the width of one bar: at the
-middle of a bar it is the height that theory expects of this bar, and it is finite everywhere.
+The data are s = ln(E/E0) of the particles that take part, as (n, K) arrays: n particles after each
+of K cycles. A run too large for memory gives them block by block. Below a histogram stands its
+difference from the theory at this energy. For scenes without measured rates the limit of high
+energies is drawn. All curves of theory in one panel are of one energy. A density is drawn as its
+mean over the width of one bar: at the middle of a bar it is the height that theory expects of this
+bar, and it is finite everywhere.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, new_f
 from mushrooms.store.spec import RunSpec
 from mushrooms.store.summary import NO_THEORY, begins_widest, known, predicted
 from scene import Mushroom, Scene, check_scene
-from scene.laws import FloatArray
+from scene.pieces import FloatArray
 from scene.refusal import BadInput, shown
 
 IntArray = npt.NDArray[np.int64]
@@ -74,16 +75,23 @@ def gathered(gains: Gains, margin: float = 0.0) -> Gathered:
     """
     rows = map(_rows, gains if isinstance(gains, Iterator) else [gains])
     head = next(rows, np.zeros((0, 1)))
-    while len(head) < ENOUGH and (more := next(rows, None)) is not None:
-        head = np.concatenate([head, more])
+    is_more = True
+    while is_more and len(head) < ENOUGH:
+        more = next(rows, None)
+        is_more = more is not None
+        if more is not None:
+            head = np.concatenate([head, more])
     if len(head) < 2:
         raise BadInput(f"gains: {len(head)} particles were followed to the end, must be at least 2")
     edges = _edges(head[:, 0], margin)
-    n, counts = 0, np.zeros(len(edges) - 1, np.int64)
+    n = 0
+    counts = np.zeros(len(edges) - 1, np.int64)
     sums, squares = np.zeros((2, head.shape[1]))
     for block in chain([head], rows):
-        n, counts = n + len(block), counts + np.histogram(block[:, 0], edges)[0]
-        sums, squares = sums + block.sum(axis=0), squares + (block**2).sum(axis=0)
+        n = n + len(block)
+        counts = counts + np.histogram(block[:, 0], edges)[0]
+        sums = sums + block.sum(axis=0)
+        squares = squares + (block**2).sum(axis=0)
     mean = sums / n
     sd = np.sqrt(np.maximum(squares / n - mean**2, 0.0))
     return Gathered(n, edges, counts, mean, sd, head[:N_LINES])
@@ -95,7 +103,9 @@ def _rows(gains: object) -> FloatArray:
         found = np.asarray(gains, np.float64)
         rows = found.reshape(len(found), -1)
     except (TypeError, ValueError):
-        raise BadInput(f"gains = {shown(gains)}, must be an array of numbers, (n,) or (n, K)") from None
+        raise BadInput(
+            f"gains = {shown(gains)}, must be an array of numbers, (n,) or (n, K)"
+        ) from None
     return np.asarray(rows[np.isfinite(rows).all(axis=1)])
 
 
@@ -106,7 +116,10 @@ def _edges(gain: FloatArray, margin: float) -> FloatArray:
 
 
 def with_residuals(n: int) -> tuple[Figure, Any]:
-    """Return a figure of n histograms side by side, and the panels (n, 2): below each that of residuals."""
+    """Return a figure of n histograms side by side, and the panels (n, 2).
+
+    Below each is one of residuals.
+    """
     figure, grid = new_figure(4.8 * n, 4.8, 2, n, height_ratios=[3, 1], sharex="col", squeeze=False)
     return figure, grid.T
 
@@ -125,7 +138,8 @@ def histogram(scene: Scene, energy: float, gains: Gains, n_particles: int | None
         BadInput: `scene` is not a scene, or there are fewer than two particles.
     """
     check_scene(scene)
-    found = known(scene, energy := check_energy(energy))
+    energy = check_energy(energy)
+    found = known(scene, energy)
     bars = gathered(gains, 0.0 if found is None else float(found.peak[1] ** 0.5))
     if found is None:
         figure, axes = new_figure(5.2, 4.2)
@@ -141,39 +155,44 @@ def histogram(scene: Scene, energy: float, gains: Gains, n_particles: int | None
 
 @rc_context(STYLE)
 def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = None) -> Figure:
-    """Draw the mean of ln(E/E0) from cycle to cycle with its spread and theory's; below it `histogram`.
+    """Draw the mean of ln(E/E0) by cycles, its spread and theory's; below it `histogram`.
 
     Args:
         scene: the scene that was simulated.
         energy: initial energy of every particle [length^2 / time^2].
-        gains: (n, K) ln(E/E0) after each cycle, of the particles that take part, or an iterator of blocks.
+        gains: (n, K) ln(E/E0) after each cycle, of the particles that take part, or an iterator of
+            blocks.
         n_particles: number of simulated particles; n by default.
 
     Raises:
         BadInput: `scene` is not a scene, or there are fewer than two particles.
     """
     check_scene(scene)
-    found = known(scene, energy := check_energy(energy))
+    energy = check_energy(energy)
+    found = known(scene, energy)
     bars = gathered(gains)
-    figure, (above, below) = new_figure(6.4, 8.4, 2, 1)  # one below the other: legible on a telephone
+    # One below the other: legible on a telephone.
+    figure, (above, below) = new_figure(6.4, 8.4, 2, 1)
     cycles = np.arange(len(bars.mean) + 1)
-    mean, sd, few = (np.pad(x, [*[(0, 0)] * (x.ndim - 1), (1, 0)]) for x in (bars.mean, bars.sd, bars.few))
+    mean, sd, few = (
+        np.pad(x, [*[(0, 0)] * (x.ndim - 1), (1, 0)]) for x in (bars.mean, bars.sd, bars.few)
+    )
     above.plot(cycles, few.T, color=GREY, linewidth=0.6, alpha=0.6)
     above.plot([], [], color=GREY, linewidth=0.6, label="single particles")
-    above.fill_between(cycles, mean - sd, mean + sd, color=SKY, alpha=0.6, linewidth=0, label="± 1 sd of one")
+    above.fill_between(
+        cycles, mean - sd, mean + sd, color=SKY, alpha=0.6, linewidth=0, label="± 1 sd of one"
+    )
     shown = np.unique(np.linspace(0, cycles[-1], min(N_MARKS, len(cycles))).astype(int))
     error = sd[shown] / np.sqrt(bars.n)
-    above.errorbar(cycles[shown], mean[shown], error, fmt="o", color=BLUE, markersize=3.5, label="mean")
-    predictions = [(k, predicted(RunSpec(scene, energy, int(k), 0))) for k in shown[1:]]
-    if all(one is not None for _, one in predictions):
-        line = np.array([0.0, *(k * one.m1 for k, one in predictions if one is not None)])
-        above.plot(
-            cycles[shown], line, color=BLACK, linewidth=1.5, label=f"theory, m1 = {line[1]:.4f} a cycle"
-        )
-        spread = np.array([0.0, *((k * one.variance) ** 0.5 for k, one in predictions if one is not None)])
-        for edge, label in ((line - spread, "theory ± its sd"), (line + spread, "_")):
-            above.plot(cycles[shown], edge, color=BLACK, linewidth=0.9, linestyle=":", label=label)
-    above.set(xlabel="cycle of the walls", ylabel="ln(E/E0)", title=_title(scene, energy, bars, n_particles))
+    above.errorbar(
+        cycles[shown], mean[shown], error, fmt="o", color=BLUE, markersize=3.5, label="mean"
+    )
+    _draw_predictions(above, scene, energy, shown)
+    above.set(
+        xlabel="cycle of the walls",
+        ylabel="ln(E/E0)",
+        title=_title(scene, energy, bars, n_particles),
+    )
     above.xaxis.get_major_locator().set_params(integer=True)
     draw_limit(below, scene, bars) if found is None else draw(below, None, bars, found)
     below.set(title="after the first cycle")
@@ -182,16 +201,38 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
     return figure
 
 
+def _draw_predictions(axes: Axes, scene: Scene, energy: float, shown: FloatArray) -> None:
+    """Draw theory's mean after each of some cycles, and its spread, if it has them all."""
+    predictions = [(k, predicted(RunSpec(scene, energy, int(k), 0))) for k in shown[1:]]
+    if all(one is not None for _, one in predictions):
+        line = np.array([0.0, *(k * one.m1 for k, one in predictions if one is not None)])
+        axes.plot(
+            shown,
+            line,
+            color=BLACK,
+            linewidth=1.5,
+            label=f"theory, m1 = {line[1]:.4f} a cycle",
+        )
+        spread = np.array(
+            [0.0, *((k * one.variance) ** 0.5 for k, one in predictions if one is not None)]
+        )
+        for edge, label in ((line - spread, "theory ± its sd"), (line + spread, "_")):
+            axes.plot(shown, edge, color=BLACK, linewidth=0.9, linestyle=":", label=label)
+
+
 def _title(scene: Scene, energy: float, bars: Gathered, n_particles: int | None) -> str:
     """Return the title: scene, energy, particles, and how many of these are not drawn."""
     n = n_particles or bars.n
     title = f"{plain(scene.name or 'a scene')}, E0 = {power(energy)}, {n:,} particles"
-    return title if n == bars.n else f"{title}\n({n - bars.n:,} of them never free, or lost: left out)"
+    return (
+        title if n == bars.n else f"{title}\n({n - bars.n:,} of them never free, or lost: left out)"
+    )
 
 
 def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
     """Draw a histogram, with the limit of high energies if theory covers the scene."""
-    highest, edges = _bars(axes, bars), bars.edges
+    highest = _bars(axes, bars)
+    edges = bars.edges
     with suppress(*NO_THEORY):
         if isinstance(scene, Mushroom) and begins_widest(scene):
             theirs = draw_adiabatic(axes, theory.energies(scene), edges, "at high energies")
@@ -246,7 +287,8 @@ def draw_never_captured(axes: Axes, place: float) -> None:
 
 def draw(axes: Axes, rest: Axes | None, bars: Gathered, found: theory.FiniteEnergy) -> None:
     """Draw a histogram, the theory over it, and residuals into `rest` if there is one."""
-    top, edges = _bars(axes, bars), bars.edges
+    top = _bars(axes, bars)
+    edges = bars.edges
     shares = np.diff(found.cdf(edges))
     if rest is None:
         axes.set(xlabel=AXIS)
@@ -275,7 +317,7 @@ def _bars(axes: Axes, bars: Gathered) -> float:
 
 
 def _residuals(rest: Axes, counts: IntArray, expected: FloatArray, edges: FloatArray) -> None:
-    """Draw counts minus expected counts, in standard errors, for bins with enough expected counts."""
+    """Draw counts minus expected counts, in standard errors, for bins that expect enough."""
     enough = expected >= LEAST_EXPECTED
     left = np.where(enough, (counts - expected) / np.sqrt(np.where(enough, expected, 1.0)), np.nan)
     rest.axhspan(-2, 2, color=SKY, alpha=0.5, linewidth=0)

@@ -1,12 +1,14 @@
-"""What heats fastest: m1 of loops of depth and mouth in floats, the largest one, m1 of the moving cap.
+"""What heats fastest: m1 of loops of depth and mouth, the largest one, m1 of the moving cap.
 
-A four-leg loop over an upright stem closes the mouth from w1 to w0 at one depth and opens it at another (sec.
-4.1, r = 1). It runs anticlockwise in the plane of w and h if the stem is deeper while the mouth closes. With
-a = V_cap / V_cha at capture, b at release and delta the island's share, both directions have
+A four-leg loop over an upright stem closes the mouth from w1 to w0 at one depth and opens it at
+another (sec. 4.1, r = 1). It runs anticlockwise in the plane of w and h if the stem is deeper while
+the mouth closes. With a = V_cap / V_cha at capture, b at release and delta the island's share, both
+directions have
     m1 = integral of (b - a - a log(b / a)) exp(-A) |d delta|,   A = integral of a |d delta|.
-The largest gain of mouths narrower than w, V(w), obeys dV = max(b - a - a log(b / a) - a V) |d delta|. It is
-convex in (a, b), so a and b are at opposite bounds. The best loop is anticlockwise where V is large, at wide
-mouths, and clockwise where V is small. It changes direction at one width, the switch.
+The largest gain of mouths narrower than w, V(w), obeys dV = max(b - a - a log(b / a) - a V) |d
+delta|. It is convex in (a, b), so a and b are at opposite bounds. The best loop is anticlockwise
+where V is large, at wide mouths, and clockwise where V is small. It changes direction at one width,
+the switch.
 """
 
 import math
@@ -25,7 +27,10 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(N_NODES)
 
 
 class Loop(NamedTuple):
-    """A four-leg loop over an upright stem, r = 1: depths while the mouth closes and opens, its extremes."""
+    """A four-leg loop over an upright stem, r = 1.
+
+    It has depths while the mouth closes and opens, and the mouth's extremes.
+    """
 
     closing: float
     opening: float
@@ -66,7 +71,10 @@ def switched(shallowest: float, deepest: float, narrowest: float, switch: float)
 
 
 def supremum(shallowest: float, deepest: float, narrowest: float) -> tuple[float, float]:
-    """Return the largest m1 within bounds on depth and mouth, and the switch of its loop; 1 is clockwise."""
+    """Return the largest m1 within bounds on depth and mouth, and the switch of its loop.
+
+    1 is clockwise.
+    """
 
     def loss(log_switch: float) -> float:
         return -switched(shallowest, deepest, narrowest, math.exp(log_switch))
@@ -77,10 +85,10 @@ def supremum(shallowest: float, deepest: float, narrowest: float) -> tuple[float
 
 
 def fastest(narrowest: float, shallowest: float, *, clockwise: bool = False) -> tuple[Loop, float]:
-    """Return the four-leg loop that gains most per time, its walls no faster than 1, and m1 over its path.
+    """Return the four-leg loop that gains most per time, walls no faster than 1, and its m1.
 
-    A leg from rest to rest takes twice as long as its walls would at full speed all the way; the factor is
-    left out.
+    A leg from rest to rest takes twice as long as its walls would at full speed all the way; the
+    factor is left out.
 
     Args:
         narrowest: least mouth.
@@ -103,7 +111,10 @@ def fastest(narrowest: float, shallowest: float, *, clockwise: bool = False) -> 
 
 
 def moving_cap(phase: float, radius: float, depth: float) -> Mushroom:
-    """Return the cap of sec. 4.2 with these amplitudes, its stem ahead by a phase; slope 0.04, not .1111."""
+    """Return the cap of sec. 4.2 with these amplitudes, its stem ahead by a phase.
+
+    Slope 0.04, not .1111.
+    """
     return Mushroom(
         r=Fourier(1.0, 1.0, sin=(radius,)),
         h=Fourier(1.0, 1.0, cos=(depth * math.sin(phase),), sin=(depth * math.cos(phase),)),
@@ -115,23 +126,33 @@ def moving_cap(phase: float, radius: float, depth: float) -> Mushroom:
 def phase_diagram(phases: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Return m1 of moving caps, amplitudes of radius and depth alike; shape (sizes, phases)."""
     return np.array(
-        [[float(theory.predict(moving_cap(p, a, a), 6).m1) for p in phases.tolist()] for a in sizes.tolist()]
+        [
+            [float(theory.predict(moving_cap(p, a, a), 6).m1) for p in phases.tolist()]
+            for a in sizes.tolist()
+        ]
     )
 
 
 def draw_phase_diagram(n_phases: int = 16, n_sizes: int = 6) -> Figure:
     """Draw m1 of the moving cap over the phase of the stem and the amplitude."""
-    phases, sizes = 2 * np.pi * np.arange(n_phases + 1) / n_phases, 0.6 * np.arange(1, n_sizes + 1) / n_sizes
+    phases = 2 * np.pi * np.arange(n_phases + 1) / n_phases
+    sizes = 0.6 * np.arange(1, n_sizes + 1) / n_sizes
     figure, axes = new_figure(7.0, 3.6)
     found = phase_diagram(phases, sizes)
     filled = axes.contourf(phases / np.pi, sizes, found, levels=12, cmap="viridis")
     figure.colorbar(filled, label="$m_1$ per cycle")
-    axes.set(xlabel="phase of the stem ahead of the cap / π", ylabel="amplitude of radius and depth / mean")
+    axes.set(
+        xlabel="phase of the stem ahead of the cap / π",
+        ylabel="amplitude of radius and depth / mean",
+    )
     return figure
 
 
 def draw_loops(deepest: tuple[float, ...] = (1.0, 6.0, 20.0), n: int = 40) -> Figure:
-    """Draw m1 of both directions and the supremum over the narrowest mouth, for several greatest depths."""
+    """Draw m1 of both directions, and the supremum over the narrowest mouth.
+
+    Each greatest depth has a line.
+    """
     mouths = np.geomspace(1e-3, 0.9, n)
     figure, axes = new_figure(7.0, 3.6)
     for i, depth in enumerate(deepest):

@@ -1,7 +1,7 @@
-"""Pictures of orbits: the path in its table, sections, the boundary map, energies, stretching; an animation.
+"""Pictures of orbits: path, sections, boundary map, energies, stretching, and an animation.
 
-Each function returns a matplotlib figure, which a notebook shows; `save` of `mushrooms.figures.style` writes
-one. Captured is blue, free is orange, in all of them.
+Each function returns a matplotlib figure, which a notebook shows; `save` of
+`mushrooms.figures.style` writes one. Captured is blue, free is orange, in all of them.
 """
 
 import math
@@ -24,13 +24,14 @@ from mushrooms.figures import style as plots, table as tables
 from mushrooms.orbits import BoolArray, FollowedOrbit, boundary, boundary_map, span_of_nu
 from scene import Mushroom, Scene, Stem
 from scene.geometry import table_at
-from scene.laws import FloatArray, is_constant
 from scene.mouth import start_time
+from scene.pieces import FloatArray
 from scene.refusal import BadInput, shown
 
 N_FRAMES = 96
 TRAIL = 6  # collisions that the animation's particle draws behind it
-CAPTURED, FREE = plots.BLUE, plots.ORANGE
+CAPTURED = plots.BLUE
+FREE = plots.ORANGE
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 
 
@@ -45,16 +46,28 @@ def _check_orbits(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> list[Follo
 
 @rc_context(plots.STYLE)
 def trajectory(orbit: FollowedOrbit) -> Figure:
-    """Draw an orbit's path in its table: walls at its start and end, their names, the mouth, the start."""
+    """Draw an orbit's path in its table, with walls at its start and end.
+
+    Names, the mouth and the start are marked.
+    """
     [orbit] = _check_orbits(orbit)
     figure, axes = plots.new_figure(6.4, 6.0)
     states = orbit.states()
-    begin, end = float(states[0, 0]), float(states[-1, 0])
+    begin = float(states[0, 0])
+    end = float(states[-1, 0])
     if orbit.scene.period:
         tables.draw_walls(
-            axes, orbit.scene, end, color=plots.GREY, linewidth=1.2, linestyle="--", label="walls at the end"
+            axes,
+            orbit.scene,
+            end,
+            color=plots.GREY,
+            linewidth=1.2,
+            linestyle="--",
+            label="walls at the end",
         )
-    tables.draw_walls(axes, orbit.scene, begin, color=plots.BLACK, linewidth=2, label="walls at the start")
+    tables.draw_walls(
+        axes, orbit.scene, begin, color=plots.BLACK, linewidth=2, label="walls at the start"
+    )
     points = states[:, 1:3]
     lines = LineCollection(
         list(np.stack([points[:-1], points[1:]], axis=1)),
@@ -65,7 +78,9 @@ def trajectory(orbit: FollowedOrbit) -> Figure:
     )
     axes.add_collection(lines)
     _names(axes, orbit.scene, begin)
-    axes.plot(*points[0], "o", color=FREE, markeredgecolor="white", markersize=9, label="start", zorder=4)
+    axes.plot(
+        *points[0], "o", color=FREE, markeredgecolor="white", markersize=9, label="start", zorder=4
+    )
     direction = states[-1, 3:] / (np.hypot(*states[-1, 3:]) or 1.0)
     ahead = points[-1] + 0.08 * np.ptp(points, axis=0).max() * direction
     axes.annotate("", ahead, points[-1], arrowprops={"arrowstyle": "-|>", "color": plots.BLACK})
@@ -73,14 +88,16 @@ def trajectory(orbit: FollowedOrbit) -> Figure:
     bar.ax.set_ylim(0, len(points) - 1)
     axes.set(aspect="equal", xlabel="x [length]", ylabel="y [length]", title=_title([orbit]))
     axes.margins(0.08)
-    # Half an inch below the axes: a wide table leaves much room between them and the end of the figure.
+    # Half an inch below the axes: a wide table leaves much room between them and the end of the
+    # figure.
     below = axes.transAxes + ScaledTranslation(0, -0.5, figure.dpi_scale_trans)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0), bbox_transform=below, ncols=3)
     return figure
 
 
 def _title(orbits: Sequence[FollowedOrbit]) -> str:
-    first, n = orbits[0], len(orbits)
+    first = orbits[0]
+    n = len(orbits)
     what = f"{len(first.walls):,} collisions" if n == 1 else f"{n} particles"
     name = plots.plain(first.scene.name or "a table")
     return f"{name}: {what} from E0 = {plots.power(first.energies()[0])}"
@@ -89,8 +106,16 @@ def _title(orbits: Sequence[FollowedOrbit]) -> str:
 def _names(axes: Axes, scene: Scene, t: float) -> None:
     """Name the walls where they are at time t, and draw the mouth."""
     table = table_at(fp, scene, t)
-    r, w, h = float(table.r), float(table.w), float(table.h)
-    style: dict[str, Any] = {"fontsize": 9, "path_effects": HALO, "ha": "center", "va": "center", "zorder": 5}
+    r = float(table.r)
+    w = float(table.w)
+    h = float(table.h)
+    style: dict[str, Any] = {
+        "fontsize": 9,
+        "path_effects": HALO,
+        "ha": "center",
+        "va": "center",
+        "zorder": 5,
+    }
     base = "base", 0.5 * (r + w) if isinstance(scene, Mushroom) else 0.0, 0.0
     places = [base] if isinstance(scene, Stem) else [("arc", 0.0, r), base]
     if h:
@@ -107,15 +132,16 @@ def _names(axes: Axes, scene: Scene, t: float) -> None:
 def section(orbits: Sequence[FollowedOrbit] | FollowedOrbit, phase: float | None = None) -> Figure:
     """Draw a Poincare section.
 
-    For a cap or a mushroom it shows place on the arc against sin phi, at each hit. In a mushroom the edge is
-    |sin phi| = nu. If nu moves, hits beyond its largest value are captured at all times, and hits below its
-    least value never. Between them it depends on the time; the colour of each hit shows it. For a stem it is
-    the section of Fermi and Ulam: the phase of the wall against the velocity after the hit.
+    For a cap or a mushroom it shows place on the arc against sin phi, at each hit. In a mushroom
+    the edge is |sin phi| = nu. If nu moves, hits beyond its largest value are captured at all
+    times, and hits below its least value never. Between them it depends on the time; the colour of
+    each hit shows it. For a stem it is the section of Fermi and Ulam: the phase of the wall against
+    the velocity after the hit.
 
     Args:
         orbits: one or more, of one scene.
-        phase: t/T of the walls, 0 to 1. Then only the first hit of the arc after this phase of each cycle is
-            drawn; for a stem, depth and velocity at this phase.
+        phase: t/T of the walls, 0 to 1. Then only the first hit of the arc after this phase of each
+            cycle is drawn; for a stem, depth and velocity at this phase.
 
     Raises:
         BadInput: the walls stand still, and a phase is asked for or the table is a stem.
@@ -138,12 +164,16 @@ def draw_section(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None
         sections = [one.first_from(times) for one, times in zip(sections, instants, strict=True)]
     span = span_of_nu(found[0].scene)
     if span and phase is not None:
-        now = table_at(fp, found[0].scene, start_time(found[0].scene) + phase * found[0].scene.period)
+        now = table_at(
+            fp, found[0].scene, start_time(found[0].scene) + phase * found[0].scene.period
+        )
         span = (float(now.w / now.r),) * 2
     if span:
         _draw_zones(axes, *span)
     place, sine = (np.concatenate([one[k] for one in sections]) for k in (2, 3))
-    _points(axes, found, place, sine, np.concatenate([one.is_captured() for one in sections]), "hits")
+    _points(
+        axes, found, place, sine, np.concatenate([one.is_captured() for one in sections]), "hits"
+    )
     axes.set(
         xlim=(0, 1),
         ylim=(-1, 1),
@@ -171,7 +201,7 @@ def _draw_stem(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None) 
     if phase is not None:
         axes.set(xlabel="y [length]", ylabel="vy [length/time]")
         return
-    has_floor = isinstance(found[0].scene, Stem) and not is_constant(found[0].scene.h)
+    has_floor = isinstance(found[0].scene, Stem) and not found[0].scene.laws["h"].is_constant
     wall, name = ("floor", "vy") if has_floor else ("side", "|vx|")
     axes.set(
         xlim=(0, 1),
@@ -182,9 +212,17 @@ def _draw_stem(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None) 
 
 
 def _points(
-    axes: Axes, found: Sequence[FollowedOrbit], x: FloatArray, y: FloatArray, captured: BoolArray, what: str
+    axes: Axes,
+    found: Sequence[FollowedOrbit],
+    x: FloatArray,
+    y: FloatArray,
+    captured: BoolArray,
+    what: str,
 ) -> None:
-    """Draw points and count them in the legend; in a mushroom captured ones apart. Many points are finer."""
+    """Draw points and count them in the legend.
+
+    In a mushroom captured ones apart. Many points are finer.
+    """
     size = min(4.0, max(0.6, 90.0 / math.sqrt(len(x) or 1)))
     kinds = [(captured, CAPTURED, "captured, "), (~captured, FREE, "free, ")]
     if not isinstance(found[0].scene, Mushroom):
@@ -192,12 +230,14 @@ def _points(
     for which, colour, name in kinds:
         if which.any():
             axes.plot(x[which], y[which], ".", color=colour, markersize=size, rasterized=True)
-            axes.plot([], [], "o", color=colour, markersize=5, label=f"{name}{which.sum():,} {what}")
+            axes.plot(
+                [], [], "o", color=colour, markersize=5, label=f"{name}{which.sum():,} {what}"
+            )
 
 
 @rc_context(plots.STYLE)
 def collision_map(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
-    """Draw the boundary map: place along the whole boundary against the sine after each collision."""
+    """Draw the boundary map: place along the boundary against the sine after each collision."""
     figure, axes = plots.new_figure(7.6, 5.0)
     draw_map(axes, _check_orbits(orbits))
     figure.legend(loc="outside lower center", ncols=2)
@@ -212,7 +252,9 @@ def draw_map(axes: Axes, found: Sequence[FollowedOrbit]) -> None:
     for slot in boundary(found[0].scene):
         axes.axvline(slot.end, color=plots.BLACK, linewidth=0.8)
         if slot.end - slot.begin > 0:
-            axes.text((slot.begin + slot.end) / 2, 1.03, slot.wall, ha="center", va="bottom", fontsize=9)
+            axes.text(
+                (slot.begin + slot.end) / 2, 1.03, slot.wall, ha="center", va="bottom", fontsize=9
+            )
     axes.set(
         xlim=(0, 1),
         ylim=(-1, 1),
@@ -280,7 +322,7 @@ def energy_in_time(orbit: FollowedOrbit) -> Figure:
 def exponents(
     orbits: Sequence[FollowedOrbit] | FollowedOrbit, progress: Callable[[int], None] | None = None
 ) -> Figure:
-    """Draw finite-time Lyapunov exponents against the number of collisions, the last with its error.
+    """Draw finite-time Lyapunov exponents against collisions, the last with its error.
 
     Raises:
         BadInput: as `mushrooms.lyapunov.stretching`.
@@ -299,14 +341,19 @@ def exponents(
         axes.plot(count, one.exponents, color=colour, linewidth=1.2, label=label)
         axes.errorbar(count[-1] * (1 + 0.01 * k), one.exponent, one.error, color=colour, capsize=3)
     axes.axhline(0, color=plots.BLACK, linewidth=0.8)
-    axes.set(xscale="log", xlabel="collisions", ylabel="exponent [1/collision]", title=_title(found))
+    axes.set(
+        xscale="log", xlabel="collisions", ylabel="exponent [1/collision]", title=_title(found)
+    )
     figure.legend(loc="outside lower center", ncols=1 + (len(found) > 3))
     return figure
 
 
 @rc_context(plots.STYLE)
 def write_animation(
-    orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAMES, progress: tables.Progress | None = None
+    orbit: FollowedOrbit,
+    file: BinaryIO,
+    n_frames: int = N_FRAMES,
+    progress: tables.Progress | None = None,
 ) -> None:
     """Write a GIF of the walls in motion and the particle with its last flights behind it.
 
@@ -319,8 +366,10 @@ def write_animation(
     [orbit] = _check_orbits(orbit)
     states = orbit.states()
     times = np.linspace(states[0, 0], states[-1, 0], n_frames)
-    places, last = orbit.at(times), np.searchsorted(states[:, 0], times, side="right") - 1
-    unit, name = orbit.scene.period or 1.0, "t/T" if orbit.scene.period else "t"
+    places = orbit.at(times)
+    last = np.searchsorted(states[:, 0], times, side="right") - 1
+    unit = orbit.scene.period or 1.0
+    name = "t/T" if orbit.scene.period else "t"
     axes = tables.new_slide(orbit.scene)
     axes.plot(*places[0], "o", color=FREE, markersize=6, markerfacecolor="none", label="start")
     (trail,) = axes.plot([], [], color=plots.SKY, linewidth=1)
@@ -328,8 +377,12 @@ def write_animation(
     axes.figure.legend(loc="outside lower center")
 
     def show(k: int) -> None:
-        trail.set_data(*np.vstack([states[max(0, last[k] - TRAIL) : last[k] + 1, 1:3], places[k]]).T)
+        trail.set_data(
+            *np.vstack([states[max(0, last[k] - TRAIL) : last[k] + 1, 1:3], places[k]]).T
+        )
         dot.set_data(*places[k : k + 1].T)
-        axes.set_title(f"{plots.plain(orbit.scene.name)}   {name} = {(times[k] - times[0]) / unit:.2f}")
+        axes.set_title(
+            f"{plots.plain(orbit.scene.name)}   {name} = {(times[k] - times[0]) / unit:.2f}"
+        )
 
     tables.write_frames(orbit.scene, axes, times.tolist(), show, file, progress)

@@ -1,7 +1,7 @@
 """The style of every plot: one palette, new figures, the same bytes for the same picture.
 
-The palette is Okabe and Ito's, told apart by colour-blind readers, and viridis for phases. Simulation is
-blue and filled, theory orange or black lines.
+The palette is Okabe and Ito's, told apart by colour-blind readers, and viridis for phases.
+Simulation is blue and filled, theory orange or black lines.
 """
 
 import io
@@ -18,9 +18,15 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-BLUE, SKY, ORANGE, BLACK, GREY, GREEN = "#0072B2", "#A6CEE9", "#D55E00", "#1A1A1A", "#8C8C8C", "#009E73"
+BLUE = "#0072B2"
+SKY = "#A6CEE9"
+ORANGE = "#D55E00"
+BLACK = "#1A1A1A"
+GREY = "#8C8C8C"
+GREEN = "#009E73"
 NOTEBOOK_DPI = 100
-LONGEST, MOST_LINES = 40, 3  # letters of a line, and lines, of a name in a title
+LONGEST = 40  # letters of a line of a name in a title
+MOST_LINES = 3  # lines of such a name
 STYLE: dict[str, Any] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Verdana"],  # an SVG names them all with each text
@@ -41,11 +47,13 @@ def phase_colours(n: int) -> list[str]:
 
 
 def plain(text: str) -> str:
-    """Return a text that a figure shows as it is: a dollar in it begins no formula, and lines have an end.
+    """Return a text that a figure shows as it is: a dollar begins no formula, and lines end.
 
     A picture is made as wide as its title: the names of scenes may have any length.
     """
-    lines = (line if len(line) <= LONGEST else line[: LONGEST - 1] + "…" for line in text.splitlines())
+    lines = (
+        line if len(line) <= LONGEST else line[: LONGEST - 1] + "…" for line in text.splitlines()
+    )
     return "\n".join(islice(lines, MOST_LINES)).replace("$", r"\$")
 
 
@@ -71,7 +79,7 @@ class NotebookFigure(Figure):
 def new_figure(
     width: float, height: float, n_rows: int = 1, n_columns: int = 1, **options: Any
 ) -> tuple[Figure, Any]:
-    """Return a figure [inches] and its axes (an array when there are several), as `Figure.subplots` does."""
+    """Return a figure [inches] and its axes, as `Figure.subplots` does."""
     figure = NotebookFigure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure, figure.subplots(n_rows, n_columns, **options)
@@ -94,9 +102,15 @@ def save(figure: Figure, file: BinaryIO, suffix: str, dpi: int = 160) -> None:
 
 
 def svg(figure: Figure) -> bytes:
-    """Return a figure as a small SVG for a page: letters as text, coordinates to a hundredth of a point."""
+    """Return a figure as a small SVG for a page.
+
+    Letters are text. Coordinates have a hundredth of a point.
+    """
     file = io.BytesIO()
     with rc_context({"svg.fonttype": "none"}):
         save(figure, file, ".svg", dpi=110)
-    text = re.sub(rb'<!--.*?-->|(?<=<g) id="[^"]*"| transform="rotate\(-0 [^"]*"', b"", file.getvalue())
-    return re.sub(rb"(\.\d\d)\d+(?=[^<>]*>)", rb"\1", text)  # within tags: numbers that are read stay
+    text = re.sub(
+        rb'<!--.*?-->|(?<=<g) id="[^"]*"| transform="rotate\(-0 [^"]*"', b"", file.getvalue()
+    )
+    # Within tags: numbers that are read stay.
+    return re.sub(rb"(\.\d\d)\d+(?=[^<>]*>)", rb"\1", text)

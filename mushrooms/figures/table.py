@@ -1,4 +1,4 @@
-"""Pictures of a table: its walls through the cycle, a few chords of one trajectory, an animation."""
+"""Pictures of a table: walls through the cycle, a few chords of one trajectory, an animation."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ N_PHASES = 6
 N_CHORDS = 14
 N_FRAMES = 36
 FRAMES_PER_SECOND = 12
-WIDEST, HIGHEST = 1920, 1080  # of an animation [pixels]: it fills a slide
+# Of an animation [pixels]: it fills a slide.
+WIDEST = 1920
+HIGHEST = 1080
 DOTS_PER_INCH = 200
 
 
@@ -57,8 +59,10 @@ def chords(scene: Scene, t: float, n: int = N_CHORDS) -> np.ndarray:
     answer.
     """
     points = np.hstack(walls(scene, t))
-    top, bottom = points[1].max(), points[1].min()
-    speed, direction = 1e6 * points[0].max(), 0.61  # radians: off every symmetry
+    top = points[1].max()
+    bottom = points[1].min()
+    speed = 1e6 * points[0].max()
+    direction = 0.61  # radians: off every symmetry
     vx, vy = float(speed * np.cos(direction)), float(speed * np.sin(direction))
     state = State(t, 0.0, float(0.37 * (top or bottom)), vx, vy)
     path = [np.array([state.x, state.y])]
@@ -81,7 +85,9 @@ def new_strip(scene: Scene, width: float, max_height: float) -> Figure:
         return n_rows * (0.85 * width * n_rows / len(times) * ratio + 0.6)
 
     n_rows = 2 if len(times) > 1 and height(2) <= max_height else 1
-    figure, grid = plots.new_figure(width, min(height(n_rows), max_height), n_rows, len(times) // n_rows)
+    figure, grid = plots.new_figure(
+        width, min(height(n_rows), max_height), n_rows, len(times) // n_rows
+    )
     for k, (axes, t, colour) in enumerate(
         zip(np.ravel(grid), times, plots.phase_colours(len(times)), strict=True)
     ):
@@ -93,16 +99,20 @@ def new_strip(scene: Scene, width: float, max_height: float) -> Figure:
     return figure
 
 
-def write_picture(scene: Scene, suffix: str, file: BinaryIO, progress: Progress | None = None) -> None:
+def write_picture(
+    scene: Scene, suffix: str, file: BinaryIO, progress: Progress | None = None
+) -> None:
     """Write a picture of the scene.
 
     Args:
         scene: any valid table.
-        suffix: ".svg", ".png" or ".pdf": the table at each phase, with chords; ".gif": the walls in motion.
+        suffix: ".svg", ".png" or ".pdf": the table at each phase, with chords; ".gif": the walls in
+            motion.
         file: open for binary writing.
         progress: see `write_frames`.
     """
-    times, name = phases(scene, N_FRAMES), plots.plain(scene.name)
+    times = phases(scene, N_FRAMES)
+    name = plots.plain(scene.name)
     if suffix != ".gif":
         figure = new_strip(scene, 7.2, 6.0)
         figure.suptitle(name)
@@ -111,7 +121,9 @@ def write_picture(scene: Scene, suffix: str, file: BinaryIO, progress: Progress 
     axes = new_slide(scene)
 
     def show(k: int) -> None:
-        axes.set_title(f"{name}   " + (f"t/T = {times[k] / scene.period:.2f}" if scene.period else "static"))
+        axes.set_title(
+            f"{name}   " + (f"t/T = {times[k] / scene.period:.2f}" if scene.period else "static")
+        )
 
     write_frames(scene, axes, times, show, file, progress)
 
@@ -168,11 +180,18 @@ def write_frames(
 def _frame(scene: Scene) -> tuple[float, float, float, float]:
     # Left, right, bottom, top of one frame that holds the walls of the whole cycle.
     points = np.hstack([line for t in phases(scene, N_FRAMES) for line in walls(scene, t)])
-    (left, bottom), (right, top) = points.min(axis=1), points.max(axis=1)
+    left, bottom = points.min(axis=1)
+    right, top = points.max(axis=1)
     margin = 0.05 * max(right - left, top - bottom)
     return left - margin, right + margin, bottom - margin, top + margin
 
 
 def _set_frame(axes: Axes, scene: Scene) -> None:
     left, right, bottom, top = _frame(scene)
-    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel="x [length]", ylabel="y [length]")
+    axes.set(
+        xlim=(left, right),
+        ylim=(bottom, top),
+        aspect="equal",
+        xlabel="x [length]",
+        ylabel="y [length]",
+    )

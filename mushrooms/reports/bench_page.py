@@ -1,4 +1,4 @@
-"""The pages and figures of the benchmark: speed against error, error growth, and the numbers behind them."""
+"""The pages and figures of the benchmark: speed against error, error growth, numbers."""
 
 import math
 import statistics
@@ -77,7 +77,10 @@ def to_markdown(record: Record, workload: str) -> str:
 
 
 def _by_workload(record: Record) -> str:
-    """Return what a collision takes in the lanes on each workload that they serve, beside the lean C."""
+    """Return what a collision takes in the lanes on each workload that they serve.
+
+    The lean C stands beside it.
+    """
     ns = {(p.workload, p.solver): statistics.median(p.ns) for p in record.points}
     head = ("workload", "lanes, ns per collision", f"beside {HEADLINE}", "lean C over lanes")
     rows = []
@@ -85,7 +88,10 @@ def _by_workload(record: Record) -> str:
         lanes, lean = (ns.get((name, solver)) for solver in ("fast, lanes", "lean C"))
         if lanes is not None:
             usual = ns.get((HEADLINE, "fast, lanes"))
-            parts = [None if usual is None else lanes / usual, None if lean is None else lean / lanes]
+            parts = [
+                None if usual is None else lanes / usual,
+                None if lean is None else lean / lanes,
+            ]
             rows.append((name, f"{lanes:,.0f}", *("–" if x is None else f"{x:.2g}" for x in parts)))
     return _as_table(head, rows)
 
@@ -96,7 +102,9 @@ def _as_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def astray(p: Point) -> str:
     """Return how many further steps met a wrong wall, as text: "12 of 2,000 (0.6 %)"."""
-    return f"{p.astray:,} of {p.further:,} ({100 * p.astray / p.further:.2g} %)" if p.further else "–"
+    return (
+        f"{p.astray:,} of {p.further:,} ({100 * p.astray / p.further:.2g} %)" if p.further else "–"
+    )
 
 
 def middle_and_worst(errors: Sequence[float | None], form: str) -> tuple[str, str]:
@@ -107,7 +115,8 @@ def middle_and_worst(errors: Sequence[float | None], form: str) -> tuple[str, st
     return f"{statistics.median(numbers):{form}}", f"{max(numbers):{form}}"
 
 
-# Contrast with white is 4.5 to 1 and more; families differ by their marks too, whatever colours one sees.
+# Contrast with white is 4.5 to 1 and more; families differ by their marks too, whatever colours one
+# sees.
 COLOURS = {
     "proof": "#B34A00",
     "compiled": plots.BLUE,
@@ -139,9 +148,14 @@ NAMED = {
     "steps, flight/100": "time steps, C",
     "proof, 200 digits": "reference, with proof",
 }
-PLACES = {"time-stepping": ((-14, 0), "right"), "proof": ((6, 14), "right")}  # of their names, by family
+# Of their names, by family.
+PLACES = {
+    "time-stepping": ((-14, 0), "right"),
+    "proof": ((6, 14), "right"),
+}
 LABEL = 9  # size of text [points]
-MOST_DIGITS, LEAST_DIGITS = 300.0, 0.5
+MOST_DIGITS = 300.0
+LEAST_DIGITS = 0.5
 LEAST_NS = 10.0
 BINARY64 = 53 * math.log10(2)
 TICKS = (1, 2, 4, 8, 16, 32, 64, 128)
@@ -154,7 +168,7 @@ def digits(error: float) -> float:
 
 @rc_context(plots.STYLE)
 def headline(record: Record) -> Figure:
-    """Draw time per collision against correct digits of a few steppers on one workload, for a first look."""
+    """Draw time per collision against correct digits of a few steppers on one workload."""
     workload = next((w for w in record.workloads if w.name == HEADLINE), record.workloads[-1])
     points = [
         p
@@ -177,24 +191,37 @@ def headline(record: Record) -> Figure:
     axes.axvline(BINARY64, color=plots.BLACK, linewidth=0.8, linestyle=":")
     for p in points:
         _mark(axes, p)
-        share = p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
+        share = (
+            p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
+        )
         name = NAMED.get(p.solver, "" if p.family == "proof" else short_name(p.solver)) + (
             f",\n{100 * share:.1g} % wrong walls" if share else ""
         )
-        style: dict[str, Any] = {"textcoords": "offset points", "va": "center", "color": COLOURS[p.family]}
+        style: dict[str, Any] = {
+            "textcoords": "offset points",
+            "va": "center",
+            "color": COLOURS[p.family],
+        }
         place, style["ha"] = PLACES.get(p.family, ((9, 0), "left"))
-        axes.annotate(name, (_digits_of(p)[0], statistics.median(p.ns)), place, fontsize=LABEL + 1, **style)
+        axes.annotate(
+            name, (_digits_of(p)[0], statistics.median(p.ns)), place, fontsize=LABEL + 1, **style
+        )
     axes.text(BINARY64 * 1.04, 4e7, "binary64", fontsize=LABEL)
     return figure
 
 
 def _mark(axes: Any, p: Point) -> None:
-    colour, (first, ns, third) = COLOURS[p.family], quartiles(p.ns)
+    colour = COLOURS[p.family]
+    first, ns, third = quartiles(p.ns)
     middle, worst = _digits_of(p)
     if p.right:
-        axes.plot([middle, middle], [first, third], color=colour, marker="_", markersize=6, linewidth=1.2)
+        axes.plot(
+            [middle, middle], [first, third], color=colour, marker="_", markersize=6, linewidth=1.2
+        )
         axes.plot([worst, middle], [ns, ns], color=colour, marker="|", markersize=7, linewidth=1.2)
-        axes.plot(middle, ns, marker=MARKS[p.family], markersize=5.5, color=colour, linestyle="none")
+        axes.plot(
+            middle, ns, marker=MARKS[p.family], markersize=5.5, color=colour, linestyle="none"
+        )
 
 
 def _digits_of(p: Point) -> tuple[float, float]:
@@ -222,14 +249,28 @@ def growth(found: Growth) -> bytes:
         COLOURS["proof"],
         COLOURS["fixed-step"],
     )
-    for (name, errors), colour, mark in zip(found.followers.items(), colours, "os^Dv", strict=False):
+    for (name, errors), colour, mark in zip(
+        found.followers.items(), colours, "os^Dv", strict=False
+    ):
         shown = np.where(np.array(errors) > 0, errors, np.nan)
         every = max(1, len(count) // 16)
         axes.plot(
-            count, shown, color=colour, marker=mark, markevery=every, markersize=5, linewidth=1, label=name
+            count,
+            shown,
+            color=colour,
+            marker=mark,
+            markevery=every,
+            markersize=5,
+            linewidth=1,
+            label=name,
         )
     axes.plot(
-        count, found.bound, color=plots.BLACK, linestyle="--", linewidth=1, label="one ulp a step, grown"
+        count,
+        found.bound,
+        color=plots.BLACK,
+        linestyle="--",
+        linewidth=1,
+        label="one ulp a step, grown",
     )
     early = count[: 2 * (found.collisions // 3)]
     axes.plot(
@@ -239,6 +280,11 @@ def growth(found: Growth) -> bytes:
         linestyle=":",
         label=f"Lyapunov slope: {found.rate:.2f} decimals a collision",
     )
-    axes.set(yscale="log", xlabel="collisions", ylabel="error, relative to table and speed", ylim=(1e-60, 10))
+    axes.set(
+        yscale="log",
+        xlabel="collisions",
+        ylabel="error, relative to table and speed",
+        ylim=(1e-60, 10),
+    )
     axes.legend(loc="lower right")
     return plots.svg(figure)

@@ -1,8 +1,9 @@
 """The HTML report of a conformance run: one self-contained page, no scripts, figures embedded.
 
-It shows the verdicts by group, the worst cases with the implementation's path drawn over the certified one,
-the errors by precision class, and the implementation's point in the plane of speed and error. The colours of
-paths have one meaning in all figures, explained once on the page (`LEGEND`).
+It shows the verdicts by group, the worst cases with the implementation's path drawn over the
+certified one, the errors by precision class, and the implementation's point in the plane of speed
+and error. The colours of paths have one meaning in all figures, explained once on the page
+(`LEGEND`).
 """
 
 import math
@@ -24,7 +25,9 @@ from mushrooms.reports.page import embed, render
 from scene import BadInput, Collision, Horizon, Outcome, Scene, State, from_data
 from scene.geometry import table_at
 
-N_FAILED, N_SHARPEST = 8, 4  # cases drawn: those that failed, or else the least precise that passed
+# Cases drawn: those that failed, or else the least precise that passed.
+N_FAILED = 8
+N_SHARPEST = 4
 MAX_LISTED = 200
 EXACT = 1e-2  # ulps at which answers with no error at all are drawn
 
@@ -32,7 +35,11 @@ EXACT = 1e-2  # ulps at which answers with no error at all are drawn
 def to_html(run: Run) -> str:
     """Return the page."""
     report = reports.new_report(run)
-    seen = [verdict for verdict in report.total.counts if verdict == "pass" or report.total.counts[verdict]]
+    seen = [
+        verdict
+        for verdict in report.total.counts
+        if verdict == "pass" or report.total.counts[verdict]
+    ]
     others = [r for r in run.results if r.verdict != "pass" or r.is_known]
     by_id = {vector.id: vector for vector in vectors.load(run.level)}
     cases = [_case(result, by_id[result.id]) for result in _worst(run) if result.id in by_id]
@@ -54,11 +61,15 @@ def to_html(run: Run) -> str:
 
 
 def _worst(run: Run) -> list[Result]:
-    failed = [r for r in run.results if r.verdict in ("fail", "indeterminate") and r.answer is not None]
+    failed = [
+        r for r in run.results if r.verdict in ("fail", "indeterminate") and r.answer is not None
+    ]
     if failed:
         return failed[:N_FAILED]
     passed = [r for r in run.results if r.verdict == "pass" and r.relative is not None]
-    return sorted(passed, key=lambda r: math.inf if r.ulps is None else r.ulps, reverse=True)[:N_SHARPEST]
+    return sorted(passed, key=lambda r: math.inf if r.ulps is None else r.ulps, reverse=True)[
+        :N_SHARPEST
+    ]
 
 
 def _case(result: Result, vector: vectors.Vector) -> dict[str, Any]:
@@ -71,7 +82,8 @@ def _case(result: Result, vector: vectors.Vector) -> dict[str, Any]:
 
 def _rows(result: Result) -> list[tuple[str, str, str]]:
     """Return the fields of a failure: name, certified, given; its reason stands in the caption."""
-    certified, given = result.expected or {}, result.given or {}
+    certified = result.expected or {}
+    given = result.given or {}
     names = [
         name
         for name in dict.fromkeys([*certified, *given])
@@ -93,7 +105,11 @@ def _errors(run: Run) -> bytes:
         ulps = np.maximum([u for u in run.ulps(group) if math.isfinite(u)], EXACT)
         axes.plot(ulps, np.full(len(ulps), row), "o", color=plots.BLUE, markersize=3.5, alpha=0.5)
     _mark_classes(axes, axes.axvline)
-    axes.set(xscale="log", xlabel="backward ulps of the answers that passed", ylim=(len(groups) - 0.5, -0.5))
+    axes.set(
+        xscale="log",
+        xlabel="backward ulps of the answers that passed",
+        ylim=(len(groups) - 0.5, -0.5),
+    )
     axes.set_yticks(range(len(groups)), groups)
     return plots.svg(figure)
 
@@ -103,11 +119,16 @@ def _speed(run: Run) -> bytes:
     """Draw the implementation's point: time per collision against the error of its answers."""
     assert run.speed is not None
     ulps = np.maximum([u for u in run.ulps() if math.isfinite(u)], EXACT)
-    middle, worst = float(np.median(ulps)), float(ulps.max())
+    middle = float(np.median(ulps))
+    worst = float(ulps.max())
     figure, axes = plots.new_figure(4.8, 3.2)
     axes.plot([run.speed.best_ns] * 2, [middle, worst], color=plots.BLUE, linewidth=1.5)
-    axes.plot(run.speed.best_ns, worst, marker="v", color=plots.BLUE, linestyle="none", label="worst")
-    axes.plot(run.speed.best_ns, middle, marker="o", color=plots.BLUE, linestyle="none", label="median")
+    axes.plot(
+        run.speed.best_ns, worst, marker="v", color=plots.BLUE, linestyle="none", label="worst"
+    )
+    axes.plot(
+        run.speed.best_ns, middle, marker="o", color=plots.BLUE, linestyle="none", label="median"
+    )
     _mark_classes(axes, axes.axhline)
     axes.set(
         xscale="log",
@@ -133,7 +154,8 @@ LEGEND = (
 )
 N_CHORDS = 180  # of an arc, as `Table.outline` has it
 LEAST_SEEN = 1e-12  # of the table's size: two places that are closer are drawn as one
-CLOSE = 0.06  # half the width of the close-up, of the table's size; more where the two hits lie further apart
+# Half the width of the close-up, of the table's size; more where the two hits lie further apart.
+CLOSE = 0.06
 # The certified path and the given one: colour, width and name.
 STROKES = ((plots.ORANGE, 4.0, "certified"), (plots.BLUE, 1.5, "given"))
 Steps = list[dict[str, Any]]  # the state after each
@@ -147,7 +169,9 @@ def paths(result: Result, vector: vectors.Vector) -> bytes:
     """
     is_flow = vector.kind == "flow"  # it says where it ends, not how it came there
     scene = from_data(vector.scene)
-    certified = [o for o in middle(vector.expect[0], vector.state) if isinstance(o, Collision | Horizon)]
+    certified = [
+        o for o in middle(vector.expect[0], vector.state) if isinstance(o, Collision | Horizon)
+    ]
     given = [step for step in outcomes_of(result.answer or {}) if "x" in step and "y" in step]
     at = max(0, len(certified) - 1)
     if result.verdict != "pass" and not is_flow:
@@ -163,10 +187,11 @@ def paths(result: Result, vector: vectors.Vector) -> bytes:
 def draw_step(
     scene: Scene, state: State, truth: Collision | Horizon, given: Mapping[str, Any], place: str
 ) -> bytes:
-    """Draw one step as SVG: where it leads, and where it was said to; the whole table, and close up.
+    """Draw one step as SVG, where it leads and where it was said to: whole table and close up.
 
-    The close-up is as large as the distance of both places, so that this is seen. The title names the field
-    that is off most. Velocities are compared with the speed, places with the table's size.
+    The close-up is as large as the distance of both places, so that this is seen. The title names
+    the field that is off most. Velocities are compared with the speed, places with the table's
+    size.
 
     Args:
         scene: of the step.
@@ -187,14 +212,19 @@ def draw_step(
     figure.axes[1].locator_params(nbins=4)
     speed = math.hypot(truth.vx, truth.vy)
     scales = {"t": abs(truth.t), "x": size, "y": size, "vx": speed, "vy": speed}
-    figure.suptitle(f"{place}: {_worst_field(certified, given, scales, getattr(truth, 'wall', None))}")
+    figure.suptitle(
+        f"{place}: {_worst_field(certified, given, scales, getattr(truth, 'wall', None))}"
+    )
     return plots.svg(figure)
 
 
 def _bend_arcs(
     axes: Axes, scene: Scene, times: Sequence[float], at: Collision | Horizon, reach: float
 ) -> None:
-    """Draw the arcs near a place by points as close as a close-up needs: its chords would miss the hit."""
+    """Draw the arcs near a place by points as close as a close-up needs.
+
+    Longer chords would miss the hit.
+    """
     if at.y <= reach:
         return  # the base is near too, and drawn by the same line
     arcs = [line for line in axes.lines if np.size(line.get_xdata()) > N_CHORDS]
@@ -206,7 +236,10 @@ def _bend_arcs(
 
 
 def _worst_field(
-    certified: Mapping[str, float], given: Mapping[str, Any], scales: Mapping[str, float], wall: str | None
+    certified: Mapping[str, float],
+    given: Mapping[str, Any],
+    scales: Mapping[str, float],
+    wall: str | None,
 ) -> str:
     """Say which field of a step is off most, by its scale; a wrong wall before any number."""
     if given.get("wall") not in (None, wall):
@@ -221,8 +254,13 @@ def _worst_field(
 
 
 @rc_context(plots.STYLE)
-def _draw(scene: Scene, state: State, t: float, both: tuple[Steps, Steps], at: int, line: str) -> Figure:
-    """Draw two paths from a state, in the table of its time and of t; at the right close to step `at`."""
+def _draw(
+    scene: Scene, state: State, t: float, both: tuple[Steps, Steps], at: int, line: str
+) -> Figure:
+    """Draw two paths from a state, in the table of its time and of t.
+
+    At the right close to step `at`.
+    """
     figure, panels = plots.new_figure(7.4, 3.7, 1, 2)
     size = float(np.ptp(np.hstack(draw.walls(scene, t)), axis=1).max())
     for axes in panels:

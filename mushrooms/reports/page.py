@@ -1,7 +1,8 @@
-"""What the HTML reports share: one template, one style, embedded figures, numbers, and typeset formulas.
+"""What the HTML reports share: template, style, embedded figures, numbers, typeset formulas.
 
-A page is one file: no scripts, and nothing is loaded from elsewhere. Claims are written as plain text. What
-looks like a formula there becomes italic letters, sub- and superscripts and proper signs.
+A page is one file: no scripts, and nothing is loaded from elsewhere. Claims are written as plain
+text. What looks like a formula there becomes italic letters, sub- and superscripts and proper
+signs.
 """
 
 import json
@@ -34,7 +35,10 @@ def number(value: float | None, form: str) -> str:
 
 
 def as_json(value: Any) -> str:
-    """Return data as readers see it: jinja's own filter is for scripts and spells apostrophes by number."""
+    """Return data as readers see it.
+
+    Jinja's own filter is for scripts and spells apostrophes by number.
+    """
     return json.dumps(value, ensure_ascii=False)
 
 
@@ -45,17 +49,20 @@ def embed(svg: bytes) -> str:
 
 SIGNS = {"<=": "≤", ">=": "≥", "+-": "±", "!=": "≠", "->": "→"}
 GREEK = {
-    "alpha": "α", "beta": "β", "delta": "δ", "theta": "θ", "lambda": "λ", "mu": "μ", "nu": "ν", "omega": "ω",
-    "phi": "φ", "sigma": "σ", "tau": "τ",
+    "alpha": "α", "beta": "β", "delta": "δ", "theta": "θ", "lambda": "λ", "mu": "μ", "nu": "ν",
+    "omega": "ω", "phi": "φ", "sigma": "σ", "tau": "τ",
 }  # fmt: skip
-# A symbol with an index (V_cap, sigma_w, m1, E0), or a Greek letter alone; neither is part of a word or of a
-# path, and capitals that name claims (M1, X2) are no symbols.
+# A symbol with an index (V_cap, sigma_w, m1, E0), or a Greek letter alone; neither is part of a
+# word or of a path, and capitals that name claims (M1, X2) are no symbols.
 _LETTERS = "|".join(GREEK)
 _SYMBOL = re.compile(
-    rf"(?<![\w.-])(?:(?P<base>[a-zEVTRJ]|dV|{_LETTERS})(?:_(?P<index>[A-Za-z0-9]{{1,4}})|(?P<digit>[01]))"
+    rf"(?<![\w.-])(?:(?P<base>[a-zEVTRJ]|dV|{_LETTERS})"
+    r"(?:_(?P<index>[A-Za-z0-9]{1,4})|(?P<digit>[01]))"
     rf"|(?P<greek>{_LETTERS}))(?!\w|[\w/]*\.\w)"
 )
-_POWER = re.compile(r"(?<=[\w)²])\^(?:\((?P<long>[^()]{1,12})\)|(?P<short>-?[\d.]+(?:/\d+)?|[a-z]))")
+_POWER = re.compile(
+    r"(?<=[\w)²])\^(?:\((?P<long>[^()]{1,12})\)|(?P<short>-?[\d.]+(?:/\d+)?|[a-z]))"
+)
 
 
 def typeset(text: str) -> Markup:
@@ -72,5 +79,6 @@ def typeset(text: str) -> Markup:
 def _symbol(match: re.Match[str]) -> str:
     if match["greek"]:
         return f"<i>{GREEK[match['greek']]}</i>"
-    base, index = GREEK.get(match["base"], match["base"]), match["index"] or match["digit"]
+    base = GREEK.get(match["base"], match["base"])
+    index = match["index"] or match["digit"]
     return f"<i>{base}</i><sub>{index}</sub>"

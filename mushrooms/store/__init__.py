@@ -1,1 +1,1 @@
-"""Runs on disk: an ensemble in blocks of particles, as a Zarr group, that an interruption cannot harm."""
+"""Runs on disk: blocks of an ensemble in a Zarr group, which an interruption cannot harm."""

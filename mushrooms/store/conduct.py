@@ -1,9 +1,9 @@
-"""A run, from what there is of it to its end: what is there, limits, what is missing, and what follows it.
+"""A run, from what there is of it to its end: limits, what is missing, and what follows it.
 
-An engine is handed ranges of particles and yields blocks, in any order: in this process, or from workers of
-a Dask cluster. The bits of a particle depend on its number alone: it does not matter which engine, machine or
-block followed it, nor how often it was tried. No decision rests on the time of day: limits and rates are read
-from a clock that only goes forwards.
+An engine is handed ranges of particles and yields blocks, in any order: in this process, or from
+workers of a Dask cluster. The bits of a particle depend on its number alone: it does not matter
+which engine, machine or block followed it, nor how often it was tried. No decision rests on the
+time of day: limits and rates are read from a clock that only goes forwards.
 """
 
 import logging
@@ -33,13 +33,18 @@ OnProgress = Callable[[int], None]
 Following = Generator[tuple[BlockRange, fast.Paused], None, None]
 Engine = Callable[[RunSpec, Iterator[BlockRange], OnProgress], Following]
 RETRIES = 10  # of a block whose workers fail or die
-BLOCKS_AHEAD = 2  # waiting for each thread of the cluster: no worker idles, and few blocks are in memory
+BLOCKS_AHEAD = (
+    2  # waiting for each thread of the cluster: no worker idles, and few blocks are in memory
+)
 CONNECT_TIMEOUT = 10.0  # seconds in which a scheduler must answer
 POLL_INTERVAL = 0.5  # seconds after which limits are looked at while no block comes
 
 
 def follow(
-    spec: RunSpec, block_range: BlockRange, threads: int | None, on_progress: OnProgress | None = None
+    spec: RunSpec,
+    block_range: BlockRange,
+    threads: int | None,
+    on_progress: OnProgress | None = None,
 ) -> fast.Paused:
     """Follow the particles of a block, from their starts or from where they were.
 
@@ -68,7 +73,9 @@ def in_process(
         yield block_range, follow(spec, block_range, threads, on_progress)
 
 
-def follow_elsewhere(version: str, spec: RunSpec, block_range: BlockRange, threads: int) -> fast.Paused:
+def follow_elsewhere(
+    version: str, spec: RunSpec, block_range: BlockRange, threads: int
+) -> fast.Paused:
     """Follow a block on a worker, which must be of the version that asks.
 
     Raises:
@@ -93,7 +100,8 @@ def by_dask(
         block_ranges: to be followed.
         on_progress: see `OnProgress`.
         address: of the scheduler, as tcp://host:8786.
-        threads: for each block; 1 by default, as a worker has as many blocks at a time as it has threads.
+        threads: for each block; 1 by default, as a worker has as many blocks at a time as it has
+            threads.
 
     Raises:
         BadInput: dask.distributed is not installed, or no scheduler answers.
@@ -103,14 +111,18 @@ def by_dask(
         from distributed import Client
         from distributed.comm import CommClosedError, resolve_address
     except ImportError:
-        raise BadInput("--dask needs dask.distributed: pip install 'oscillating-mushrooms[scale]'") from None
+        raise BadInput(
+            "--dask needs dask.distributed: pip install 'oscillating-mushrooms[scale]'"
+        ) from None
     try:
         resolve_address(address)  # of what is no address the client is made, and cannot be closed
         # Not the process's default: what else computes with Dask here would wait for this one, even
         # after it has failed to connect.
         client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
+        raise BadInput(
+            f"--dask = {address}: no scheduler answers ({type(error).__name__})"
+        ) from None
     # Dask logs pages of its own when a cluster is lost, which are of no use to go on with the run.
     log = logging.getLogger("distributed.client")
     level = log.level
@@ -124,18 +136,28 @@ def by_dask(
     except RuntimeError as error:
         if "deserialization" not in str(error):
             raise
-        raise ConnectionError(f"--dask = {address}: the scheduler must have this project too") from None
+        raise ConnectionError(
+            f"--dask = {address}: the scheduler must have this project too"
+        ) from None
     finally:
         log.setLevel(level)
 
 
 def _hand_out(
-    client: Any, spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress, threads: int
+    client: Any,
+    spec: RunSpec,
+    block_ranges: Iterator[BlockRange],
+    on_progress: OnProgress,
+    threads: int,
 ) -> Following:
-    """Keep every worker busy, and yield what comes back; what is still out is dropped at the end."""
+    """Keep every worker busy, and yield what comes back.
+
+    What is still out is dropped at the end.
+    """
     from distributed import KilledWorker, wait
 
-    out, n_killed = dict[Any, BlockRange](), Counter[int]()
+    out = dict[Any, BlockRange]()
+    n_killed = Counter[int]()
 
     def submit(block_range: BlockRange) -> None:
         asked_for = (mushrooms.__version__, spec, block_range, threads)
@@ -152,7 +174,9 @@ def _hand_out(
             on_progress(0)
             try:
                 with client.as_current():
-                    done = wait(list(out), timeout=POLL_INTERVAL, return_when="FIRST_COMPLETED").done
+                    done = wait(
+                        list(out), timeout=POLL_INTERVAL, return_when="FIRST_COMPLETED"
+                    ).done
             except TimeoutError:
                 continue
             for future in done:
@@ -160,21 +184,30 @@ def _hand_out(
                 try:
                     block = future.result()
                 except KilledWorker:
-                    # So many workers died with it that the scheduler gave it up; it may not be its fault.
+                    # So many workers died with it that the scheduler gave it up; it may not be its
+                    # fault.
                     n_killed[block_range.number] += 1
-                    if n_killed[block_range.number] > RETRIES:
-                        raise ConnectionError(
-                            f"--dask: workers die of block {block_range.number} again and again"
-                        ) from None
+                    _check_killed(block_range, n_killed[block_range.number])
                     submit(block_range)
-                    continue
-                yield block_range, block
+                else:
+                    yield block_range, block
     finally:
         client.cancel(list(out))
 
 
-BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
-LEAST_BLOCK, MOST_BLOCK = 256, 2**17  # particles: a thread's lanes are full, and memory stays small
+def _check_killed(block_range: BlockRange, n_killed: int) -> None:
+    """Give a block up that workers have died of too often."""
+    if n_killed > RETRIES:
+        raise ConnectionError(
+            f"--dask: workers die of block {block_range.number} again and again"
+        ) from None
+
+
+BLOCK_COLLISIONS = (
+    2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
+)
+LEAST_BLOCK = 256  # particles: a thread's lanes are full
+MOST_BLOCK = 2**17  # memory stays small
 ROOM = 2**12  # particles of a new run's block, however few it has: it may be widened
 BLOCK_BYTES = 2**26  # on disk; in memory several times that
 LANES_OF_A_THREAD = 128  # particles that a thread needs to be quick
@@ -190,7 +223,10 @@ class LimitReached(Exception):  # noqa: N818 (nothing is wrong: the run goes on 
 
 
 def block_size(spec: RunSpec, threads: int) -> int:
-    """Return how many particles a block has, a power of two: it takes seconds, and fits into memory."""
+    """Return how many particles a block has, a power of two.
+
+    It takes seconds, and fits into memory.
+    """
     each = expected_collisions(spec.scene, spec.energy, spec.n_cycles)
     least = max(LEAST_BLOCK, LANES_OF_A_THREAD * threads)
     wanted = BLOCK_COLLISIONS / max(each, 1.0) if math.isfinite(each) else LEAST_BLOCK
@@ -199,7 +235,10 @@ def block_size(spec: RunSpec, threads: int) -> int:
 
 
 def block_of_new(spec: RunSpec, n_particles: int, threads: int) -> int:
-    """Return how many particles a new run's blocks have: no more than it takes, as chunks are filled up."""
+    """Return how many particles a new run's blocks have.
+
+    They are no more than the run takes, because chunks are filled up.
+    """
     return min(block_size(spec, threads), max(ROOM, 1 << (n_particles - 1).bit_length()))
 
 
@@ -227,8 +266,9 @@ def open_or_create(
         at_least: whether one that has more particles will do, and stays as large as it is.
 
     Raises:
-        BadInput: the folder has another run, or this one and `resume` was not asked for; it is of another
-            version or its numbers do not come out here; it has too many blocks; the disk is too small.
+        BadInput: the folder has another run, or this one and `resume` was not asked for; it is of
+            another version or its numbers do not come out here; it has too many blocks; the disk is
+            too small.
     """
     found: dict[str, Any] = {"block": block or default, "cycles_of_a_chunk": None}
     is_there = is_run(folder)
@@ -242,12 +282,14 @@ def open_or_create(
         most = MOST_CHUNKS * found["cycles_of_a_chunk"]
         if spec.n_cycles > most:
             raise BadInput(
-                f"output {str(folder)!r}: --cycles = {spec.n_cycles}, must be at most {most} for a run that"
-                f" began with {found['cycles_of_a_chunk']}: more need another folder"
+                f"output {str(folder)!r}: --cycles = {spec.n_cycles}, must be at most {most} for a"
+                f" run that began with {found['cycles_of_a_chunk']}: more need another folder"
             )
     if n_particles > MOST_BLOCKS * found["block"]:
         least = -(-n_particles // MOST_BLOCKS)
-        raise BadInput(f"--block = {found['block']}: {n_particles} particles need blocks of at least {least}")
+        raise BadInput(
+            f"--block = {found['block']}: {n_particles} particles need blocks of at least {least}"
+        )
     shape = shape_of(spec, n_particles, found["block"], found["cycles_of_a_chunk"])
     run = StoredRun(folder, spec, shape, spec.command(name, n_particles, folder))
     damaged = run.check()
@@ -256,18 +298,25 @@ def open_or_create(
         _probe(run)
         run.describe()
         if damaged:
-            few = ", ".join(map(str, damaged[:5])) + (" ..." if len(damaged) > 5 else "")
-            print(f"damaged or broken off: {len(damaged)} blocks ({few}), followed again", file=sys.stderr)
+            _tell_damaged(damaged)
     return run
 
 
+def _tell_damaged(blocks: list[int]) -> None:
+    """Say on stderr which blocks are followed again."""
+    few = ", ".join(map(str, blocks[:5])) + (" ..." if len(blocks) > 5 else "")
+    count = f"damaged or broken off: {len(blocks)} blocks ({few}), followed again"
+    print(count, file=sys.stderr)
+
+
 def read_description(folder: Path, spec: RunSpec, more: dict[str, object]) -> dict[str, Any]:
-    """Return the description of a stored run, if it is the one asked for, with as many cycles or fewer.
+    """Return a stored run's description, if it is the one asked for with no more cycles.
 
     Raises:
         BadInput: it is another: in what, and both values; or its description is damaged.
     """
-    found, wanted = attributes_of(folder), spec.to_data() | more
+    found = attributes_of(folder)
+    wanted = spec.to_data() | more
     other = difference(found, {name: value for name, value in wanted.items() if name != "cycles"})
     if other is not None:
         raise BadInput(f"output {str(folder)!r} holds another run: {other}")
@@ -292,8 +341,8 @@ def complete(
 ) -> None:
     """Follow what is missing of the first particles, and keep it block by block.
 
-    A block is written while the next one is followed, so that two are in memory and no more. However this
-    ends, the block being written is written first.
+    A block is written while the next one is followed, so that two are in memory and no more.
+    However this ends, the block being written is written first.
 
     Args:
         run: to be completed so far; what is missing beyond stays as it is.
@@ -307,11 +356,13 @@ def complete(
         LimitReached: a limit; what was kept stays.
         OSError: a block could not be written; the one followed meanwhile is dropped.
     """
-    begin, n = CLOCK(), run.shape.n_particles if n_particles is None else n_particles
+    begin = CLOCK()
+    n = run.shape.n_particles if n_particles is None else n_particles
     there = n - sum(block_range.n for block_range in run.lacking() if block_range.first < n)
 
     def report(n_done: int) -> None:
-        on_progress(max(0, there + n_done))  # the last block may have more particles than are asked for
+        # The last block may have more particles than are asked for.
+        on_progress(max(0, there + n_done))
         if max_seconds is not None and CLOCK() - begin > max_seconds:
             raise LimitReached(f"--max-seconds = {max_seconds:g} have passed")
 
@@ -335,15 +386,16 @@ def complete(
 def _probe(run: StoredRun) -> None:
     """Refuse to go on where the particles that are there would come out otherwise.
 
-    The first ones are followed again, and where they are to be lengthened once more through all cycles, from
-    their starts and from where they are.
+    The first ones are followed again, and where they are to be lengthened once more through all
+    cycles, from their starts and from where they are.
     """
     there = run.first_there()
     if there is None:
         return
     stored = run.block(there, PROBED)
     n, n_cycles = stored.ensemble.cycle_energies.shape
-    block_range, spec = BlockRange(there, there * run.shape.block, n), run.spec
+    block_range = BlockRange(there, there * run.shape.block, n)
+    spec = run.spec
     _compare(run, stored, follow(spec._replace(n_cycles=n_cycles), block_range, None))
     if n_cycles < spec.n_cycles:
         longer = follow(spec, block_range._replace(before=stored), None)
@@ -351,14 +403,17 @@ def _probe(run: StoredRun) -> None:
 
 
 def _compare(run: StoredRun, one: fast.Paused, other: fast.Paused) -> None:
-    ones, others = columns(one), columns(other)
+    ones = columns(one)
+    others = columns(other)
     for name in run.shape.names:
         if not np.array_equal(ones[name], others[name], equal_nan=ones[name].dtype.kind == "f"):
-            made, here = attributes_of(run.folder), made_by()
+            made = attributes_of(run.folder)
+            here = made_by()
             by = next((key for key in here if made.get(key) != here[key]), "versions")
             raise BadInput(
-                f"output {str(run.folder)!r}: {name} of its first particles comes out otherwise here, where"
-                f" {by} = {here[by]}; it was made by {made.get(by)}; another --out begins anew"
+                f"output {str(run.folder)!r}: {name} of its first particles comes out otherwise"
+                f" here, where {by} = {here[by]}; it was made by {made.get(by)}; another --out"
+                " begins anew"
             )
 
 
@@ -369,5 +424,6 @@ def _check_disk(run: StoredRun) -> None:
     free = shutil.disk_usage(run.folder).free
     if needed > free:
         raise BadInput(
-            f"output {str(run.folder)!r}: {needed / 1e9:.3g} GB to be written, {free / 1e9:.3g} GB are free"
+            f"output {str(run.folder)!r}: {needed / 1e9:.3g} GB to be written, {free / 1e9:.3g} GB"
+            " are free"
         )

@@ -2,12 +2,13 @@
 
 zarr writes and reads the arrays (`spec`).
 
-A block is finished when its marker is there: a small sealed file, written after the block's arrays, that
-holds their SHA-256. A block without a marker, or whose arrays do not have these sums, is followed again. So
-neither the moment at which a process ends nor damage to a file can change a result.
+A block is finished when its marker is there: a small sealed file, written after the block's arrays,
+that holds their SHA-256. A block without a marker, or whose arrays do not have these sums, is
+followed again. So neither the moment at which a process ends nor damage to a file can change a
+result.
 
-`open_run` is the one way to read a finished run: whatever draws, exports or audits it goes through there, and
-every number of the run is held to its checksum first.
+`open_run` is the one way to read a finished run: whatever draws, exports or audits it goes through
+there, and every number of the run is held to its checksum first.
 """
 
 import hashlib
@@ -39,10 +40,19 @@ from mushrooms.store.summary import RunTally, tally_of
 from scene import BadInput
 from scene.files.writer import sealed, unsealed, write_file
 
-GROUP, MARKERS = "ensemble.zarr", "blocks"
+GROUP = "ensemble.zarr"
+MARKERS = "blocks"
 DESCRIPTION = "run.marker"  # among the markers: the group's attributes once more, sealed
 # What zarr raises of damaged metadata and chunks.
-UNREADABLE = (ArithmeticError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
+UNREADABLE = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
 
 
 OURS = {"seal", "cycles_of_a_chunk"}  # attributes that no Zarr group of others has
@@ -92,13 +102,17 @@ class StoredRun:
         spec: all that decides its bits.
         shape: its sizes.
         command: how it is made.
-        tally, seconds: of the finished blocks, once `check` has looked. A block that the run has outgrown,
-            because it holds fewer particles or cycles than it has to, is not finished.
+        tally, seconds: of the finished blocks, once `check` has looked. A block that the run has
+            outgrown, because it holds fewer particles or cycles than it has to, is not finished.
     """
 
     def __init__(self, folder: Path, spec: RunSpec, shape: Shape, command: str) -> None:
-        self.folder, self.spec, self.shape, self.command = folder, spec, shape, command
-        self.tally, self.seconds = RunTally(), 0.0
+        self.folder = folder
+        self.spec = spec
+        self.shape = shape
+        self.command = command
+        self.tally = RunTally()
+        self.seconds = 0.0
         self._markers: dict[int, Marker] = {}  # of the blocks on disk, those outgrown included
         self._arrays: dict[str, Any] = {}  # of the Zarr group, once it is open
         # The marker of another run, moved here with its files, does not count.
@@ -113,7 +127,9 @@ class StoredRun:
         for block_range in self.lacking():
             marker = self._markers.get(block_range.number)
             is_continued = marker is not None and marker.rows == block_range.n
-            yield block_range._replace(before=self.block(block_range.number) if is_continued else None)
+            yield block_range._replace(
+                before=self.block(block_range.number) if is_continued else None
+            )
 
     def lacking(self) -> Iterator[BlockRange]:
         """Yield the blocks still to be followed."""
@@ -128,7 +144,9 @@ class StoredRun:
 
     def first_there(self) -> int | None:
         """Return the first block on disk, one with fewer cycles than the run before others."""
-        whole = {number: marker.cycles == self.shape.n_cycles for number, marker in self._markers.items()}
+        whole = {
+            number: marker.cycles == self.shape.n_cycles for number, marker in self._markers.items()
+        }
         return min(whole, key=lambda number: (whole[number], number), default=None)
 
     def block(self, number: int, most: int | None = None) -> Paused:
@@ -141,9 +159,12 @@ class StoredRun:
         return paused_of(arrays, self.spec.energy, self._markers[number].seconds)
 
     def check(self) -> list[int]:
-        """Read every block, count those that are as they were written, and return the damaged ones."""
+        """Read every block, count the whole ones, and return the damaged ones."""
         damaged = []
-        for pattern in (".*.part", "*.partial"):  # what we, or zarr, were writing when the process ended
+        for pattern in (
+            ".*.part",
+            "*.partial",
+        ):  # what we, or zarr, were writing when the process ended
             for path in self.folder.rglob(pattern):
                 path.unlink(missing_ok=True)
         if is_run(self.folder) and not self._is_open():
@@ -220,7 +241,8 @@ class StoredRun:
         Raises:
             BadInput: it is missing or damaged.
         """
-        marker, begin = self._markers.get(number), number * self.shape.block
+        marker = self._markers.get(number)
+        begin = number * self.shape.block
         if marker is not None and self._is_open():
             with suppress(*UNREADABLE):
                 array = np.asarray(self._arrays[name][begin : begin + marker.rows])
@@ -243,7 +265,8 @@ class StoredRun:
                 marker = self._marker(number)
                 self._count(marker, RunTally(particles=marker.rows))
         if any(self.lacking()):
-            there, n = self.tally.particles, self.shape.n_particles
+            there = self.tally.particles
+            n = self.shape.n_particles
             raise BadInput(
                 f"run {str(self.folder)!r} has {there} of {n} particles: go on with {self.command}"
             )
@@ -253,7 +276,10 @@ class StoredRun:
                 self.read(number, name)
 
     def part(self, number: int, name: str) -> Array:
-        """Return a field of `fast.Ensemble` for the particles of a block; its bytes are the same."""
+        """Return a field of `fast.Ensemble` for the particles of a block.
+
+        Its bytes are the same.
+        """
         if name == "energy":
             return self.read(number, "cycle_energies")[:, -1]
         if name == "n_collisions":
@@ -261,7 +287,7 @@ class StoredRun:
         return self.read(number, name) if name in self.shape.names else np.empty(0)
 
     def sha256(self) -> str:
-        """Return `fast.Ensemble.sha256` of all particles, block by block: memory does not grow with the run.
+        """Return `fast.Ensemble.sha256` of all particles, block by block: memory stays bounded.
 
         It goes field by field over all particles, so that blocks of any size come to the same.
 
@@ -289,7 +315,8 @@ class StoredRun:
         """
         numbers = range(-(-n // self.shape.block))
         arrays = {
-            name: np.concatenate([self.read(k, name) for k in numbers])[:n] for name in self.shape.names
+            name: np.concatenate([self.read(k, name) for k in numbers])[:n]
+            for name in self.shape.names
         }
         seconds = self.seconds * n / max(self.tally.particles, 1)
         return paused_of(arrays, self.spec.energy, seconds).ensemble
@@ -344,7 +371,7 @@ def is_run(folder: Path) -> bool:
 
 
 def attributes_of(folder: Path) -> dict[str, Any]:
-    """Return the description of a stored run: the sealed file, or if that is damaged the group's attributes.
+    """Return a stored run's description: the sealed file, or if damaged the group's attributes.
 
     Raises:
         BadInput: the folder holds no run, or both are damaged.
@@ -367,11 +394,14 @@ def open_run(folder: Path) -> StoredRun:
     """Return a finished run, to be read: all of it is as it was written.
 
     Raises:
-        BadInput: the folder holds none, one of another schema, one that is not finished, or a damaged one.
+        BadInput: the folder holds none, one of another schema, one that is not finished, or a
+            damaged one.
     """
     found = attributes_of(folder)
     if found["schema"] != SCHEMA:
-        raise BadInput(f"run {str(folder)!r}: schema = {found['schema']} there, {SCHEMA} is read here")
+        raise BadInput(
+            f"run {str(folder)!r}: schema = {found['schema']} there, {SCHEMA} is read here"
+        )
     spec = spec_of(found)
     shape = shape_of(spec, found["particles"], found["block"], found["cycles_of_a_chunk"])
     run = StoredRun(folder, spec, shape, found["command"])
@@ -381,7 +411,7 @@ def open_run(folder: Path) -> StoredRun:
 
 
 def folder_of(path: Path) -> Path | None:
-    """Return the folder of the run that a path is: that folder, or the Zarr group in it; None if it is none.
+    """Return the folder of the run that a path is, or has a Zarr group of; None if it is none.
 
     Raises:
         BadInput: it is a group of ours without the checksums beside it.

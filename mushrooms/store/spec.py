@@ -1,7 +1,8 @@
 """What a run is: all that decides its bits, the arrays that are stored of it, and their sizes.
 
-A block of particles is one chunk of each array. Along the cycles a chunk holds as many as the run began with,
-and a run that is lengthened gets further chunks. What is not there yet reads as nan, or as -1.
+A block of particles is one chunk of each array. Along the cycles a chunk holds as many as the run
+began with, and a run that is lengthened gets further chunks. What is not there yet reads as nan, or
+as -1.
 """
 
 import json
@@ -48,11 +49,15 @@ class RunSpec(NamedTuple):
         return {
             "schema": SCHEMA,
             "version": mushrooms.__version__,
-            "scene": json.loads(json.dumps(scenes.to_data(self.scene))),  # lists, as they are read back
+            "scene": json.loads(
+                json.dumps(scenes.to_data(self.scene))
+            ),  # lists, as they are read back
             "energy": self.energy,
             "cycles": self.n_cycles,
             "seed": self.seed,
-            **({"phases": list(self.phases)} if self.phases else {}),  # as older runs say it that have none
+            **(
+                {"phases": list(self.phases)} if self.phases else {}
+            ),  # as older runs say it that have none
         }
 
     def command(self, scene: str, n_particles: int, folder: Path) -> str:
@@ -72,11 +77,16 @@ class RunSpec(NamedTuple):
 def spec_of(data: dict[str, Any]) -> RunSpec:
     """Return the specification that a store holds."""
     phases = tuple(data.get("phases", ()))
-    return RunSpec(scenes.from_data(data["scene"]), data["energy"], data["cycles"], data["seed"], phases)
+    return RunSpec(
+        scenes.from_data(data["scene"]), data["energy"], data["cycles"], data["seed"], phases
+    )
 
 
 def difference(stored: dict[str, Any], wanted: dict[str, Any]) -> str | None:
-    """Return the first field in which a stored run differs from the one wanted, with both values; or None."""
+    """Return the first field in which a stored run differs from the one wanted, with both values.
+
+    Or None.
+    """
     stored, wanted = ({**data, "phases": data.get("phases", [])} for data in (stored, wanted))
     for name, value in wanted.items():
         found = stored.get(name)
@@ -89,7 +99,7 @@ def difference(stored: dict[str, Any], wanted: dict[str, Any]) -> str | None:
 
 
 def made_by() -> dict[str, Any]:
-    """Return the versions of packages and the revision of the source tree, on which bits may depend."""
+    """Return what bits may depend on: versions of packages, revision of the source tree."""
     return {
         "versions": {
             "oscillating-mushrooms": mushrooms.__version__,
@@ -103,11 +113,16 @@ def made_by() -> dict[str, Any]:
 
 
 def _revision() -> str | None:
-    """Return the commit of the source tree, with `+` if files differ from it; None without a tree."""
+    """Return the commit of the source tree, with `+` if files differ from it.
+
+    None without a tree.
+    """
     here = Path(__file__).parent
     try:
         command = ["git", "describe", "--always", "--abbrev=40", "--dirty=+", "--exclude=*"]
-        done = subprocess.run(command, cwd=here, capture_output=True, text=True, timeout=20, check=False)
+        done = subprocess.run(
+            command, cwd=here, capture_output=True, text=True, timeout=20, check=False
+        )
     except (OSError, subprocess.TimeoutExpired):
         return None
     return done.stdout.strip() or None
@@ -133,7 +148,9 @@ class Stored(NamedTuple):
     meaning: str
 
 
-ONE, CYCLES, SLOTS = ("particle",), ("particle", "cycle"), ("particle", "cycle", "narrowing")
+ONE = ("particle",)
+CYCLES = ("particle", "cycle")
+SLOTS = ("particle", "cycle", "narrowing")
 LOOKS = ("particle", "cycle", "phase")
 FIELDS = {
     "cycle_energies": Stored(CYCLES, "float64", "energy v^2/2 at the end of each cycle"),
@@ -144,7 +161,9 @@ FIELDS = {
     "vy": Stored(ONE, "float64", "velocity of the last state"),
     "outcome": Stored(ONE, "int8", f"0 to 3: {OUTCOMES}; -1: not followed yet"),
     "takes_part": Stored(ONE, "int8", "1: counts in means and shares; -1: not followed yet"),
-    "t_in": Stored(SLOTS, "float64", "begin of the capture interval around each minimum of nu; nan: none"),
+    "t_in": Stored(
+        SLOTS, "float64", "begin of the capture interval around each minimum of nu; nan: none"
+    ),
     "t_out": Stored(SLOTS, "float64", "end of that stay"),
     "wall_counts": Stored(("particle", "wall"), "int64", f"collisions with {' '.join(WALLS)}"),
     "n_careful": Stored(ONE, "int64", "collisions left to the careful step"),
@@ -194,14 +213,20 @@ class Shape(NamedTuple):
 
     @property
     def names(self) -> list[str]:
-        """Return the arrays that hold anything: a scene without minima of nu has no capture intervals."""
+        """Return the arrays that hold anything.
+
+        A scene without minima of nu has no capture intervals.
+        """
         return [name for name in FIELDS if 0 not in self.of(name, 1, 1)]
 
     @property
     def bytes_of_a_particle(self) -> int:
         """Return how much disk a particle takes."""
         kinds = {name: np.dtype(FIELDS[name].kind) for name in self.names}
-        return sum(kind.itemsize * math.prod(self.of(name, 1, self.n_cycles)) for name, kind in kinds.items())
+        return sum(
+            kind.itemsize * math.prod(self.of(name, 1, self.n_cycles))
+            for name, kind in kinds.items()
+        )
 
 
 def shape_of(spec: RunSpec, n_particles: int, block: int, chunked: int | None = None) -> Shape:
@@ -221,10 +246,13 @@ def columns(paused: Paused) -> Arrays:
 
 
 def paused_of(arrays: Arrays, energy0: float, seconds: float) -> Paused:
-    """Return the ensemble that arrays were stored of, which has taken so many seconds in one thread."""
+    """Return the ensemble that arrays were stored of, and its seconds in one thread."""
     none = np.zeros((*arrays["cycle_energies"].shape, 0))
     empty = {"t_in": none, "t_out": none, "phase_energies": none, "phase_captured": none}
     found: dict[str, Any] = empty | arrays | {"energy0": energy0, "seconds": seconds, "threads": 1}
-    found |= {"energy": found["cycle_energies"][:, -1], "n_collisions": found["wall_counts"].sum(axis=1)}
+    found |= {
+        "energy": found["cycle_energies"][:, -1],
+        "n_collisions": found["wall_counts"].sum(axis=1),
+    }
     found["phase_captured"] = found["phase_captured"].astype(bool)
     return Paused(Ensemble(**{name: found[name] for name in Ensemble._fields}), found["lanes"])

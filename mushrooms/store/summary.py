@@ -1,4 +1,4 @@
-"""What the summary of a run says: counts, the mean of log E / E0, collisions to expect, and theory."""
+"""What the summary of a run says: counts, mean log E / E0, expected collisions, theory."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -51,7 +51,10 @@ def tally_of(found: Ensemble) -> RunTally:
 
 
 class Gain(NamedTuple):
-    """The mean of n numbers and its standard error; None where they are too few, or one is infinite."""
+    """The mean of n numbers and its standard error.
+
+    None where they are too few, or one is infinite.
+    """
 
     n: int = 0
     mean: float | None = None
@@ -73,7 +76,8 @@ def gain_of(gains: Callable[[], Iterable[npt.NDArray[np.float64]]]) -> Gain:
             lengths.append(len(part))
             yield from (part[:, -1] - centre).tolist()
 
-    total, n = math.fsum(values(0.0)), sum(lengths)
+    total = math.fsum(values(0.0))
+    n = sum(lengths)
     if not n or not math.isfinite(total):
         return Gain(n)
     mean = total / n
@@ -81,7 +85,9 @@ def gain_of(gains: Callable[[], Iterable[npt.NDArray[np.float64]]]) -> Gain:
     return Gain(n, mean, math.sqrt(squares / (n - 1) / n) if n > 1 else None)
 
 
-MOST_CYCLES = 300  # after which particles that grow faster stay fast enough for any run never to end
+MOST_CYCLES = (
+    300  # after which particles that grow faster stay fast enough for any run never to end
+)
 CAREFUL_COST = 50  # collisions in lanes that take as long as one careful step, measured at 40 to 80
 
 
@@ -96,10 +102,12 @@ def expected_collisions(scene: Scene, energy: float, n_cycles: int) -> float:
 def _collisions_of_a_cycle(scene: Scene, energy: float) -> float:
     """Return how many collisions to expect of a particle that is fast beside the walls.
 
-    Particles uniform in place and direction meet the walls, of length P around an area A, at the rate
-    v P / (pi A), however they move; in a cycle v^2 goes as 1 / A.
+    Particles uniform in place and direction meet the walls, of length P around an area A, at the
+    rate v P / (pi A), however they move; in a cycle v^2 goes as 1 / A.
     """
-    begin, span, n_times = start_time(scene), one_cycle(scene), 64
+    begin = start_time(scene)
+    span = one_cycle(scene)
+    n_times = 64
     area, _ = _size(scene, begin)
     sizes = [_size(scene, begin + span * ((k + 0.5) / n_times)) for k in range(n_times)]
     rates = [math.sqrt(2.0 * energy * area / a) * walls / (math.pi * a) for a, walls in sizes]
@@ -107,7 +115,10 @@ def _collisions_of_a_cycle(scene: Scene, energy: float) -> float:
 
 
 def _as_first_cycles(scene: Scene, n_cycles: int) -> float:
-    """Return how many first cycles make as many collisions; theory says how v grows in a mushroom."""
+    """Return how many first cycles make as many collisions.
+
+    Theory says how v grows in a mushroom.
+    """
     if n_cycles <= 1 or not isinstance(scene, Mushroom):
         return n_cycles
     growth = float(theory.mean_of(scene, lambda s: s.context.exp(s / 2), 5))
@@ -117,11 +128,13 @@ def _as_first_cycles(scene: Scene, n_cycles: int) -> float:
 def _size(scene: Scene, t: float) -> tuple[float, float]:
     """Return a table's area [length^2] and the length of its walls [length] at a time."""
     now = table_at(fp, scene, t)
-    return float(now.cap_area() + now.stem_area()), math.fsum(part.length for part in stretches(now))
+    return float(now.cap_area() + now.stem_area()), math.fsum(
+        part.length for part in stretches(now)
+    )
 
 
 def careful_note(summary: Mapping[str, Any]) -> str | None:
-    """Return a line on careful steps, if a run took a second of one core and they took over a tenth of it.
+    """Return a line on careful steps, if a run took a second and they a tenth of it or more.
 
     Args:
         summary: as `mushrooms simulate` prints it.
@@ -132,8 +145,9 @@ def careful_note(summary: Mapping[str, Any]) -> str | None:
     if seconds < 1.0 or part <= 0.1:
         return None
     return (
-        f"careful steps: {share:.2g} of the collisions, some {part:.0%} of the time. They are as right as the"
-        " others. Walls that move far between two collisions need them: at higher energy they are fewer"
+        f"careful steps: {share:.2g} of the collisions, some {part:.0%} of the time. They are as"
+        " right as the others. Walls that move far between two collisions need them: at higher"
+        " energy they are fewer"
     )
 
 
@@ -159,16 +173,17 @@ class Theory(NamedTuple):
 
 
 def measured(spec: RunSpec, n_captured: int, gain: Gain) -> dict[str, Any]:
-    """Return m1 and p_nc as measured, with standard errors, as predicted, and the difference in errors (z).
+    """Return m1 and p_nc as measured, with errors, as predicted, and the differences in errors.
 
     Args:
         spec: the run.
         n_captured: cycles with a capture, of all particles that take part.
         gain: ln(E/E0) of these particles after the last cycle.
 
-    The prediction is that at the run's energy where rates of the scene's frozen tables are known. Elsewhere
-    it is the limit of high energies, and without z: what that leaves out is not known. None is what is
-    unknown: of a cycle that does not begin where the mouth is widest too (see `begins_widest`).
+    The prediction is that at the run's energy where rates of the scene's frozen tables are known.
+    Elsewhere it is the limit of high energies, and without z: what that leaves out is not known.
+    None is what is unknown: of a cycle that does not begin where the mouth is widest too (see
+    `begins_widest`).
     """
     n, k = gain.n, spec.n_cycles
     mean, error = (None if x is None else x / k for x in (gain.mean, gain.standard_error))
@@ -192,7 +207,7 @@ def measured(spec: RunSpec, n_captured: int, gain: Gain) -> dict[str, Any]:
 
 
 def explain_limit(spec: RunSpec, summary: Mapping[str, Any]) -> str | None:
-    """Return a line that tells that theory beside a run is the limit of high energies, or why there is none.
+    """Return a line that says why theory beside a run is the limit of high energies, or is none.
 
     Args:
         spec: the run.
@@ -205,26 +220,32 @@ def explain_limit(spec: RunSpec, summary: Mapping[str, Any]) -> str | None:
     is_still = not spec.scene.period  # energies are what they were, at any energy
     if summary["m1_theory"] is None or summary["m1"] is None or is_of_this_energy or is_still:
         return None
-    return "m1_theory, p_nc_theory: the limit of high energies; what is left at this one is not known"
+    return (
+        "m1_theory, p_nc_theory: the limit of high energies; what is left at this one is not known"
+    )
 
 
 def _explain_narrow_start(scene: Mushroom) -> str:
     """Say why a cycle that begins with a narrow mouth has no theory, and how to shift it."""
-    begin, length = start_time(scene), scene.period
-    now, widest = table_at(fp, scene, begin), theory.Cycle.of(scene, DIGITS)
+    begin = start_time(scene)
+    length = scene.period
+    now = table_at(fp, scene, begin)
+    widest = theory.Cycle.of(scene, DIGITS)
     wait = (float(widest.start) - begin) % length
     return (
         f"m1_theory, p_nc_theory: none, for the cycle begins at t = {begin:.6g} with its mouth at"
         f" {float(now.w / now.r):.4g} r, not at its widest, {float(widest.nu_max):.4g} r:"
-        f" some particles start in the island; shift all laws by {-wait!r} in time, to begin where it is"
+        f" some particles start in the island; shift all laws by {-wait!r} in time, to begin where"
+        " it is"
     )
 
 
 def _measured_error(scene: Scene, share: float, n: int) -> float:
     """Return the standard error of a measured share of n that were free.
 
-    Of n that are all alike the binomial one would be 0, as if no more could tell: there it is that of a share
-    of 1 / (n + 1). Where the mouth never narrows no particle can be captured, and the share is known.
+    Of n that are all alike the binomial one would be 0, as if no more could tell: there it is that
+    of a share of 1 / (n + 1). Where the mouth never narrows no particle can be captured, and the
+    share is known.
     """
     if not mouth_minima(scene):
         return 0.0
@@ -236,7 +257,9 @@ def _binomial_error(share: float, n: int) -> float:
     return math.sqrt(max(0.0, share * (1.0 - share)) / n)
 
 
-def _pull(found: float | None, wanted: float, error: float | None, left_out: float | None) -> float | None:
+def _pull(
+    found: float | None, wanted: float, error: float | None, left_out: float | None
+) -> float | None:
     if found is None or error is None or left_out is None or not (error or left_out):
         return None
     return round((found - wanted) / math.hypot(error, left_out), 3)
@@ -245,9 +268,10 @@ def _pull(found: float | None, wanted: float, error: float | None, left_out: flo
 def begins_widest(scene: Mushroom) -> bool:
     """Tell whether the cycles that are simulated begin where theory's do: where nu is greatest.
 
-    There all particles that take part are free. At a narrower mouth some of the starts, uniform in all of the
-    table, lie in the part of the island that opens later: they count as captured, with the energy of those
-    that are free, and no energy however high mends that. Later cycles do not know of it.
+    There all particles that take part are free. At a narrower mouth some of the starts, uniform in
+    all of the table, lie in the part of the island that opens later: they count as captured, with
+    the energy of those that are free, and no energy however high mends that. Later cycles do not
+    know of it.
     """
     now = table_at(fp, scene, start_time(scene))
     widest = theory.Cycle.of(scene, DIGITS).nu_max
@@ -265,9 +289,9 @@ def known(scene: Scene, energy: float) -> theory.FiniteEnergy | None:
 def predicted(spec: RunSpec) -> Theory | None:
     """Return what theory says of a run; None where it covers nothing.
 
-    What finite energy adds to a cycle goes as E^(-1/2) with the energy at which the cycle begins. Cycles are
-    independent, so its mean falls by the mean of exp(-s / 2) each. Mean, share and variance of a run are all
-    of its energy, or all of the limit.
+    What finite energy adds to a cycle goes as E^(-1/2) with the energy at which the cycle begins.
+    Cycles are independent, so its mean falls by the mean of exp(-s / 2) each. Mean, share and
+    variance of a run are all of its energy, or all of the limit.
     """
     if not isinstance(spec.scene, Mushroom) or not begins_widest(spec.scene):
         return None
@@ -275,11 +299,14 @@ def predicted(spec: RunSpec) -> Theory | None:
         limit = theory.predict(spec.scene, DIGITS)
     except NO_THEORY:
         return None
-    m1, p_nc, variance = float(limit.m1), float(limit.p_nc), float(limit.sd) ** 2
+    m1 = float(limit.m1)
+    p_nc = float(limit.p_nc)
+    variance = float(limit.sd) ** 2
     there = known(spec.scene, spec.energy)
     if there is None:
         return Theory(m1, p_nc, variance)
-    slower, left = there.mean_of_exp(-0.5), there.theory_error
+    slower = there.mean_of_exp(-0.5)
+    left = there.theory_error
     share = math.fsum(slower**k for k in range(spec.n_cycles)) / spec.n_cycles
     return Theory(
         m1 + share * (there.mean_s - m1),

@@ -1,7 +1,8 @@
-"""Tables as files, CSV and Parquet: what was run goes with them, and damage is seen when they are read.
+"""Tables as files, CSV and Parquet: what was run goes with them, damage is seen on reading.
 
-Parquet has a place for metadata, and a checksum for each page of numbers. CSV has neither: beside `run.csv`
-stands `run.csv-metadata.json`, as the W3C's "CSV on the Web" has it, with the SHA-256 of the CSV file.
+Parquet has a place for metadata, and a checksum for each page of numbers. CSV has neither: beside
+`run.csv` stands `run.csv-metadata.json`, as the W3C's "CSV on the Web" has it, with the SHA-256 of
+the CSV file.
 """
 
 import csv
@@ -30,7 +31,8 @@ def write_table(path: Path, tables: Tables, about: Mapping[str, Any]) -> None:
     Args:
         path: with an ending of SUFFIXES.
         tables: columns by their names, lists or arrays; one table at least.
-        about: what goes with them: scene, energy, seed, version. In Parquet each is a text, JSON if need be.
+        about: what goes with them: scene, energy, seed, version. In Parquet each is a text, JSON if
+            need be.
 
     Raises:
         BadInput: pyarrow is not installed.
@@ -47,7 +49,10 @@ def write_table(path: Path, tables: Tables, about: Mapping[str, Any]) -> None:
 
     write_files(
         path.parent,
-        {path.name: partial(_write_csv, tables, digest.update), metadata_of(path).name: write_metadata},
+        {
+            path.name: partial(_write_csv, tables, digest.update),
+            metadata_of(path).name: write_metadata,
+        },
     )
 
 
@@ -78,7 +83,9 @@ def check_digest(path: Path, label: str) -> None:
     with path.open("rb") as file:
         found = hashlib.file_digest(file, "sha256").hexdigest()
     if found != wanted:
-        raise BadInput(f"{label}: it is not as it was written, by the SHA-256 in its metadata: {remove}")
+        raise BadInput(
+            f"{label}: it is not as it was written, by the SHA-256 in its metadata: {remove}"
+        )
 
 
 def import_arrow() -> tuple[Any, Any]:
@@ -99,7 +106,7 @@ def import_arrow() -> tuple[Any, Any]:
 def read_rows(
     path: Path, label: str, needed: Sequence[str], known: Sequence[str] | None = None
 ) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield the rows of a CSV file by the names of its columns, each with its place; # begins a comment.
+    """Yield the rows of a CSV file by column names, each with its place; # begins a comment.
 
     Args:
         path: of the file.
@@ -115,13 +122,7 @@ def read_rows(
         rows = (row for row in reader if any(map(str.strip, row)) and not row[0].startswith("#"))
         try:
             names = _names(next(rows, []), label)
-            lacking = [name for name in needed if name not in names]
-            twice = [name for i, name in enumerate(names) if name in names[:i]]
-            unknown = [name for name in names if known and name not in known]
-            for fault, found in (("is missing", lacking), ("stands twice", twice), ("is unknown", unknown)):
-                if found:
-                    which = f"; columns are {', '.join(known)}" if known else ""
-                    raise BadInput(f"{label}: column {shown(found[0])} {fault}{which}")
+            _check_names(names, label, needed, known)
             for row in rows:
                 place = f"{label}:{reader.line_num}"
                 if len(row) != len(names):
@@ -162,13 +163,18 @@ def read_number(place: str, name: str, text: str) -> float:
 
 
 def _write_csv(tables: Tables, note: Callable[[bytes], object], file: BinaryIO) -> None:
-    """Write CSV, whose numbers read back to the same bits; `note` receives each piece as it is written."""
+    """Write CSV, whose numbers read back to the same bits.
+
+    `note` receives each piece as it is written.
+    """
     for number, columns in enumerate(tables):
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         if number == 0:
             writer.writerow(columns)
-        lists = (column.tolist() if hasattr(column, "tolist") else column for column in columns.values())
+        lists = (
+            column.tolist() if hasattr(column, "tolist") else column for column in columns.values()
+        )
         writer.writerows(zip(*lists, strict=True))
         content = text.getvalue().encode()
         note(content)
@@ -180,7 +186,9 @@ def _write_parquet(tables: Tables, about: Mapping[str, Any], file: BinaryIO) -> 
     arrow, parquet = import_arrow()
     parts = map(arrow.table, tables)
     first = next(parts)
-    texts = {name: word if isinstance(word, str) else json.dumps(word) for name, word in about.items()}
+    texts = {
+        name: word if isinstance(word, str) else json.dumps(word) for name, word in about.items()
+    }
     schema = first.schema.with_metadata(texts)
     # As a context: else it would close itself later, in a page.
     with parquet.ParquetWriter(file, schema, write_page_checksum=True) as writer:
@@ -194,13 +202,30 @@ def _unreadable(label: str, line: int, error: Exception) -> BadInput:
 
 
 def _names(row: Sequence[str], label: str) -> list[str]:
-    """Return the names in a first row; of one that nothing separates refuse another separator by its name."""
+    """Return the names in a first row.
+
+    Of one that nothing separates refuse another separator by its name.
+    """
     names = [name.strip() for name in row]
     if len(names) == 1:
         for mark, word in SEPARATORS.items():
             if mark in names[0]:
                 raise BadInput(f"{label}: its columns are separated by {word}, must be by commas")
     return names
+
+
+def _check_names(
+    names: Sequence[str], label: str, needed: Sequence[str], known: Sequence[str] | None
+) -> None:
+    """Refuse columns of which one is missing, stands twice, or is unknown."""
+    lacking = [name for name in needed if name not in names]
+    twice = [name for i, name in enumerate(names) if name in names[:i]]
+    unknown = [name for name in names if known and name not in known]
+    faults = (("is missing", lacking), ("stands twice", twice), ("is unknown", unknown))
+    for fault, found in faults:
+        if found:
+            which = f"; columns are {', '.join(known)}" if known else ""
+            raise BadInput(f"{label}: column {shown(found[0])} {fault}{which}")
 
 
 def _miscounted(row: Sequence[str], names: Sequence[str]) -> str:

@@ -42,7 +42,10 @@ def write_files(folder: Path, contents: Mapping[str, bytes | memoryview | str | 
 
 @contextmanager
 def named(path: Path) -> Iterator[None]:
-    """Let what fails say of which file: a full disk is found out by writing, where the system names none."""
+    """Let what fails say of which file.
+
+    A full disk is found out by writing, where the system names none.
+    """
     try:
         yield
     except OSError as error:
@@ -67,10 +70,14 @@ def sealed(content: bytes) -> bytes:
 
 
 def unsealed(path: Path) -> bytes | None:
-    """Return what was sealed in a file; None when there is none, or not all of it is as it was written."""
+    """Return what was sealed in a file.
+
+    None when there is none, or not all of it is as it was written.
+    """
     try:
         found = path.read_bytes()
     except OSError:
         return None
-    content, seal = found[:-SEAL], found[-SEAL:]
+    content = found[:-SEAL]
+    seal = found[-SEAL:]
     return content if hashlib.sha256(content).digest() == seal else None

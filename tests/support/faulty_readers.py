@@ -11,7 +11,7 @@ from mpmath import fp
 from conformance.suite.process import CheckFailure
 from scene import Mushroom, from_data
 from scene.geometry import TableAt, rounded as table_of
-from scene.laws import Law, bounds, value
+from scene.laws import GivenLaw, bounds, value
 from support.faulty_steppers import (
     FLOW,
     NUMBERS,
@@ -308,7 +308,7 @@ def passes_samples(request: Line, _: Line, why: str, *, n: int) -> bool:
     """Look at n instants of a period alone."""
     data = request["scene"]
     try:
-        laws = {k: msgspec.convert(v, Law) for k, v in data.items() if k not in WORDS}
+        laws = {k: msgspec.convert(v, GivenLaw) for k, v in data.items() if k not in WORDS}
         for i in range(n):
             now = {name: float(value(fp, law, i / n)) for name, law in laws.items()}
             from_data({"table": data["table"], **now})

@@ -18,9 +18,7 @@ from reference.isolation import Isolator
 from reference.jets import Jet, multiply
 from reference.timeline import Legs, Waves
 from reference.walls import MovingWalls
-from scene.laws import bounds, leg_at
 from scene.mpmath_internals import ends
-from scene.tables import laws
 
 Fault = Callable[[pytest.MonkeyPatch], None]
 
@@ -41,7 +39,7 @@ def replacing(owner: object, name: str) -> Callable[[Callable[..., Any]], Fault]
 @replacing(Legs, "jet")
 def knots_unseen(honest, self, s):
     """The piece that holds where an interval begins is taken to hold on all of it."""
-    return self._on(leg_at(self.law, self.instant + exact_ends(s)[0]), s)
+    return self._on(self.law.leg_at(self.instant + exact_ends(s)[0]), s)
 
 
 @replacing(Legs, "__init__")
@@ -51,9 +49,9 @@ def period_from_zero(honest, self, arithmetic, law, instant):
 
 
 @replacing(rational, "is_zero")
-def tie_with_the_residual(_, scene, state, wall, s):
+def tie_with_the_residual(_, table, state, wall, s):
     """Ties are judged by f, not by f - f(0)."""
-    return rational.wall_jet(scene, state, wall, s).f.is_zero()
+    return rational.wall_jet(table, state, wall, s).f.is_zero()
 
 
 @replacing(Isolator, "value")
@@ -70,15 +68,15 @@ def residual_forgotten(monkeypatch):
 
 
 @replacing(start, "_distance_of")
-def size_of_all_time(honest, scene, wall, motion):
+def size_of_all_time(honest, table, wall, motion):
     """A state is on the wall it names by the largest size of all time."""
-    return motion.arithmetic.number(max(bounds(law).highest for law in laws(scene).values()))
+    return motion.arithmetic.number(max(law.bounds().highest for law in table.laws.values()))
 
 
 @replacing(start, "_walls_near")
-def corner_unseen(honest, scene, state):
+def corner_unseen(honest, table, state):
     """A state that names a wall is on no other."""
-    return [] if state.wall else honest(scene, state)
+    return [] if state.wall else honest(table, state)
 
 
 def hit_at_end_counts(monkeypatch):

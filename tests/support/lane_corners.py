@@ -11,7 +11,7 @@ from mpmath import fp
 
 from fast.kernel import records
 from fast.kernel.records import FloatArray
-from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
+from scene import BangBang, Cap, Fourier, GivenLaw, Mushroom, Scene
 from scene.laws import value
 from support.lane_anywhere import Start
 
@@ -28,7 +28,8 @@ def at_the_end_of_a_resting_arc(n: int, random: np.random.Generator) -> tuple[Sc
 
 
 def _from_resting_arc(at: float, random: np.random.Generator) -> Start:
-    angle, pace = random.uniform(0.1, 3.0), random.uniform(0.5, 2.0)
+    angle = random.uniform(0.1, 3.0)
+    pace = random.uniform(0.5, 2.0)
     x, y = np.cos(angle), np.sin(angle)
     goal = random.choice([-1.0, 1.0]) * at
     if abs(goal - x) < 0.3:
@@ -61,11 +62,12 @@ def at_the_end_of_a_chord(n: int, random: np.random.Generator) -> tuple[Scene, l
     return Cap(r=r), _along_the_arc(r, n, random, -13)
 
 
-def _along_the_arc(r: Law, n: int, random: np.random.Generator, farthest: float) -> list[Start]:
+def _along_the_arc(r: GivenLaw, n: int, random: np.random.Generator, farthest: float) -> list[Start]:
     starts = []
     for t, s in _times(n, random):
         angle = min(10.0 ** random.uniform(-2.5, 0.4), 2.9)
-        here, there = _at(r, t), _at(r, t + s)
+        here = _at(r, t)
+        there = _at(r, t + s)
         x, y = here * np.cos(angle), here * np.sin(angle)
         starts.append((_state(t, s, x, y, there, _offset(random, farthest)), int(records.ARC)))
     return starts
@@ -73,14 +75,19 @@ def _along_the_arc(r: Law, n: int, random: np.random.Generator, farthest: float)
 
 def at_the_edge_of_the_mouth(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
     """Fly from the left side or the floor to the upper end of the right side."""
-    w, lean = _moving(0.5, random), float(random.choice([0.0, random.uniform(-0.3, 0.3)]))
+    w = _moving(0.5, random)
+    lean = float(random.choice([0.0, random.uniform(-0.3, 0.3)]))
     starts = []
     for t, s in _times(n, random):
-        here, there, off = _at(w, t), _at(w, t + s), _offset(random)
-        y, wall = -float(random.uniform(0.01, 0.95)), records.LEFT
+        here = _at(w, t)
+        there = _at(w, t + s)
+        off = _offset(random)
+        y = -float(random.uniform(0.01, 0.95))
+        wall = records.LEFT
         x = -(here + lean * y)
         if random.random() < 0.4:
-            y, wall = -1.0, records.FLOOR
+            y = -1.0
+            wall = records.FLOOR
             x = random.uniform(-0.9, 0.9) * (here - lean)
         starts.append((_state(t, s, x, y, there + lean * off, off), int(wall)))
     return Mushroom(r=1.0, w=w, h=1.0, slope=lean), starts
@@ -96,7 +103,7 @@ CORNERS = {
 }
 
 
-def _moving(mean: float, random: np.random.Generator) -> Law:
+def _moving(mean: float, random: np.random.Generator) -> GivenLaw:
     swing = mean * float(random.choice([0.04, 0.3]))
     if random.random() < 0.5:
         return Fourier(mean, 1.0, (swing,), (0.2 * swing,))
@@ -112,7 +119,7 @@ def _offset(random: np.random.Generator, farthest: float = -8) -> float:
     return float(random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(farthest - 8, farthest))
 
 
-def _at(law: Law, t: float) -> float:
+def _at(law: GivenLaw, t: float) -> float:
     return float(value(fp, law, float(t)))
 
 

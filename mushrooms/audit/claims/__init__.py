@@ -1,4 +1,4 @@
-"""The claims of the paper, read from claims.toml, with the check of each: a file for each group of claims."""
+"""The claims of the paper, read from claims.toml, and how each is checked, a file a group."""
 
 import tomllib
 from functools import cache

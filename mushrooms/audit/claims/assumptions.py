@@ -1,10 +1,10 @@
 """What the paper assumes of a cycle and its particles: C2 to C5 and C10.
 
-C2, the key assumption of sec. 3.4: the chaotic zone is uniformly filled at all times, in area and direction,
-whatever the energies. Particles are looked at through the cycle: those of the frozen table's chaotic zone,
-below the mouth or in the cap with |sin phi| < nu, released ones among them.
-C3, C4, C10: what a cycle is to its particles, its shapes in their order. C5: speeds grow at most linearly in
-the number of collisions, and E ~ t^2 where nothing is exponential.
+C2, the key assumption of sec. 3.4: the chaotic zone is uniformly filled at all times, in area and
+direction, whatever the energies. Particles are looked at through the cycle: those of the frozen
+table's chaotic zone, below the mouth or in the cap with |sin phi| < nu, released ones among them.
+C3, C4, C10: what a cycle is to its particles, its shapes in their order. C5: speeds grow at most
+linearly in the number of collisions, and E ~ t^2 where nothing is exponential.
 """
 
 import math
@@ -19,25 +19,36 @@ import theory
 from mushrooms.audit.claim import DIGITS, Check, ClaimEvidence
 from mushrooms.audit.claims.experiments import one_cycle
 from mushrooms.audit.claims.finite_energy import ACW
-from mushrooms.audit.runs import RUNS, Sample, run_seed, scene_of
-from mushrooms.audit.tolerances import Cdf, FloatArray, Mean, close, exact, fits, mean, share, stated
+from mushrooms.audit.runs import RUNS, Sample, at_knots, run_seed, scene_of
+from mushrooms.audit.tolerances import (
+    Cdf,
+    FloatArray,
+    Mean,
+    close,
+    exact,
+    fits,
+    mean,
+    share,
+    stated,
+)
 from scene import BangBang, Horizon, Mushroom, Scene, State, load
 from scene.geometry import table_at
-from scene.laws import bounds
-from scene.tables import laws, width_factors
 
 SCENES = ("moving-cap", "fixed-cap-clockwise")
 ENERGY = 1e7
 N_PARTICLES = {"quick": 2500, "full": 20_000}
 PHASES = (3 / 8, 4 / 8, 6 / 8, 1.0)
-OTHER_LEGS, IRREGULAR = "fixed-cap-other-legs@1e7", "fixed-cap-irregular@1e7"
+OTHER_LEGS = "fixed-cap-other-legs@1e7"
+IRREGULAR = "fixed-cap-irregular@1e7"
 N_CLOCKS = 3
 ROUNDING = 1e-12  # relative, of what a few thousand collisions keep exactly
-SLIDING_HITS, SLIDING_SPEED = 2000, 30.0
+SLIDING_HITS = 2000
+SLIDING_SPEED = 30.0
 SLOW = ("ergodic@1e4x120", "moving-cap-trivial@1e4x120")
 BOUNDED = ("breathing-circle", "moving-cap", "fixed-cap-clockwise")
 N_HITS = 3000
-SLOWEST = 0.02  # share of the speeds taken to gain as the next do: theory does not reach to the walls' own
+# Share of the speeds taken to gain as the next do: theory does not reach to the walls' own.
+SLOWEST = 0.02
 MOVING = 0.06  # half the moving cap's growth rate of log E in a cycle: that of its speeds
 N_SPEEDS = 5
 STARTS = ((0.3, 0.4, 0.3), (-0.5, 0.2, 1.1), (0.1, 0.6, 2.0), (0.0, 0.3, 2.9))  # x, y, direction
@@ -46,8 +57,10 @@ STARTS = ((0.3, 0.4, 0.3), (-0.5, 0.2, 1.1), (0.1, 0.6, 2.0), (0.0, 0.3, 2.9))  
 def filling(evidence: ClaimEvidence) -> Iterator[Check]:
     """C2: shares, places and directions in the chaotic zone at phases of the cycle."""
     for name in SCENES:
-        table, places = load(name), []
-        n, seed = N_PARTICLES[evidence.size], run_seed(evidence.seed, RUNS["moving-cap@1e7"], -2)
+        table = load(name)
+        places = []
+        n = N_PARTICLES[evidence.size]
+        seed = run_seed(evidence.seed, RUNS["moving-cap@1e7"], -2)
         states = starts(table, n, seed)
         for phase in PHASES:
             t = table.period * phase
@@ -78,7 +91,8 @@ def filling(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def starts(table: Scene, n: int, seed: int) -> list[State]:
     """Draw n states of ENERGY, uniform in area and direction at time 0."""
-    random, now = np.random.default_rng(seed), table_at(fp, table, 0.0)
+    random = np.random.default_rng(seed)
+    now = table_at(fp, table, 0.0)
     speed = math.sqrt(2 * ENERGY)
     found: list[State] = []
     while len(found) < n:
@@ -89,7 +103,7 @@ def starts(table: Scene, n: int, seed: int) -> list[State]:
 
 
 class Zone(NamedTuple):
-    """Where the zone's particles are, as shares of what is even: uniform in (0, 1) if it is filled so.
+    """Where the zone's particles are, as shares: uniform in (0, 1) if the zone is filled evenly.
 
     below: share of the particles that are below the mouth, with its error.
     chords: of those in the cap, by |sin phi|.
@@ -109,7 +123,12 @@ EVEN: tuple[tuple[str, int, str, Cdf], ...] = (
         "the outer tenth empty, where some were just released",
         lambda u: np.minimum(u / 0.9, 1),
     ),
-    ("depth in the stem", 2, "twice as dense at the mouth as at the floor", lambda u: (4 * u - u * u) / 3),
+    (
+        "depth in the stem",
+        2,
+        "twice as dense at the mouth as at the floor",
+        lambda u: (4 * u - u * u) / 3,
+    ),
     (
         "directions in the stem",
         3,
@@ -121,7 +140,8 @@ EVEN: tuple[tuple[str, int, str, Cdf], ...] = (
 
 def in_the_zone(table: Scene, t: float, rows: FloatArray) -> Zone:
     """Pick the zone's particles at time t from rows of x, y, vx, vy."""
-    now, nu = table_at(fp, table, t), float(theory.volumes_at(fp, table, t).nu)
+    now = table_at(fp, table, t)
+    nu = float(theory.volumes_at(fp, table, t).nu)
     x, y, vx, vy = rows.T
     offset = np.abs(x * vy - y * vx) / np.hypot(vx, vy) / now.r
     below = y < 0
@@ -137,18 +157,21 @@ def in_the_zone(table: Scene, t: float, rows: FloatArray) -> Zone:
 
 def _chords(s: FloatArray | float) -> FloatArray:
     """Return, but for a factor, the area in phase of the chords nearer to the centre than s r."""
-    return np.asarray(s * np.sqrt(1 - np.minimum(np.square(s), 1.0)) + np.arcsin(np.minimum(s, 1.0)))
+    return np.asarray(
+        s * np.sqrt(1 - np.minimum(np.square(s), 1.0)) + np.arcsin(np.minimum(s, 1.0))
+    )
 
 
 def _unmixed(table: Scene, t: float) -> float:
     """Return how far the share below the mouth lags behind the volumes.
 
-    Through a mouth of width 2w an area A is left at the rate 2 w v / (pi A). So a share that the walls move
-    at a rate is short of it by that rate times pi A B / (2 w v (A + B)), A and B the zone's areas on both
-    sides.
+    Through a mouth of width 2w an area A is left at the rate 2 w v / (pi A). So a share that the
+    walls move at a rate is short of it by that rate times pi A B / (2 w v (A + B)), A and B the
+    zone's areas on both sides.
     """
     step = 1e-4 * table.period
-    (now, before), place = (theory.volumes_at(fp, table, s) for s in (t, t - step)), table_at(fp, table, t)
+    now, before = (theory.volumes_at(fp, table, s) for s in (t, t - step))
+    place = table_at(fp, table, t)
     rate = abs(now.v_stem / now.v_cha - before.v_stem / before.v_cha) / step
     both = now.v_stem * (now.v_cha - now.v_stem) / now.v_cha / (2 * fp.pi)
     return float(rate * fp.pi * both / (2 * place.w * math.sqrt(2 * ENERGY)))
@@ -174,17 +197,19 @@ def at_another_pace(legs: np.ndarray) -> Mushroom:
     assert isinstance(table, Mushroom)
     times = [0.0, *np.cumsum(legs)[:-1].tolist(), 1.0]
     h, w = (
-        BangBang(tuple((t, knot[1]) for t, knot in zip(times, law.knots, strict=True)))
-        for law in (table.h, table.w)
-        if isinstance(law, BangBang)
+        BangBang(tuple(zip(times, at_knots(table.laws[name]), strict=True))) for name in ("h", "w")
     )
     return Mushroom(r=table.r, h=h, w=w, slope=table.slope, name="another-pace")
 
 
 def sliding(evidence: ClaimEvidence) -> list[Check]:
-    """C4: walls that slide along themselves; a mouth's edge over a cap at rest, the sides of a rectangle."""
+    """C4: walls that slide along themselves.
+
+    A mouth's edge over a cap at rest, the sides of a rectangle.
+    """
     sample = evidence.sample(ACW)
-    # Captured at phases 4/8 and 5/8, between which the base gives way to the mouth; the arc is at rest.
+    # Captured at phases 4/8 and 5/8, between which the base gives way to the mouth; the arc is at
+    # rest.
     inside = sample.phase_captured[:, 0, 3] & sample.phase_captured[:, 0, 4]
     largest = float(np.max(np.abs(sample.change(inside, 3, 4)), initial=0.0))
     moved = np.abs(sample.change(~sample.captured, 3, 4)).mean()
@@ -229,9 +254,13 @@ def speeds(evidence: ClaimEvidence) -> list[Check]:
 
 
 def _at_most_linear(evidence: ClaimEvidence, name: str) -> Check:
-    """Check v_n - v_0 <= 2 u n, u the fastest wall: in the wall's frame a hit only turns the speed."""
+    """Check v_n - v_0 <= 2 u n, u the fastest wall.
+
+    In the wall's frame a hit only turns the velocity.
+    """
     table = load(name)
-    fastest, share = walls_speed(table), -math.inf
+    fastest = walls_speed(table)
+    share = -math.inf
     for x, y, turn in STARTS:
         start = State(0.0, x, y, 2 * fastest * math.cos(turn), 2 * fastest * math.sin(turn))
         done = evidence.steppers.trajectory(table, start, N_HITS, math.inf)
@@ -239,7 +268,8 @@ def _at_most_linear(evidence: ClaimEvidence, name: str) -> Check:
         gained = (after - 2 * fastest) / (2 * fastest * np.arange(1, len(after) + 1))
         share = max(share, float(gained.max()))
     return stated(
-        f"{name}, slow starts: largest gain of speed over n collisions, in 2 u n, u the fastest wall",
+        f"{name}, slow starts: largest gain of speed over n collisions, in 2 u n, u the fastest"
+        " wall",
         share <= 1 + ROUNDING,
         f"{share:.3f}",
         "at most 1",
@@ -247,19 +277,26 @@ def _at_most_linear(evidence: ClaimEvidence, name: str) -> Check:
 
 
 def walls_speed(scene: Scene) -> float:
-    """Return a bound on the speed across itself of arc, floor and sides at the mouth [length / time]."""
-    speeds = [bounds(law).slope for name, law in laws(scene).items() if name in ("r", "h")]
+    """Return a bound on the speed of arc, floor and sides across themselves [length / time].
+
+    The sides' is that at the mouth.
+    """
+    speeds = [law.bounds().slope for name, law in scene.laws.items() if name in ("r", "h")]
     if isinstance(scene, Mushroom):
-        factors = [bounds(law) for law in width_factors(scene)]
-        speeds.append(sum(f.slope * math.prod(g.highest for g in factors if g is not f) for f in factors))
+        factors = [law.bounds() for law in scene.width.factors]
+        speeds.append(
+            sum(f.slope * math.prod(g.highest for g in factors if g is not f) for f in factors)
+        )
     return max(speeds)
 
 
 def _quadratic(sample: Sample) -> list[Check]:
     """Compare the mean speed's growth with a straight line, and its slope with theory."""
-    name, k = sample.run.name, sample.run.n_cycles
+    name = sample.run.name
+    k = sample.run.n_cycles
     v = sample.speed * np.exp(np.column_stack([np.zeros(sample.n), sample.s]) / 2)
-    half, whole = v[:, k // 2] - v[:, 0], v[:, -1] - v[:, 0]
+    half = v[:, k // 2] - v[:, 0]
+    whole = v[:, -1] - v[:, 0]
     accelerating = math.log2((math.exp(MOVING * k) - 1) / (math.exp(MOVING * k / 2) - 1))
     gain, left = _gain_of_a_cycle(sample, v[:, :-1])
     return [
@@ -286,11 +323,13 @@ def _quadratic(sample: Sample) -> list[Check]:
 def _gain_of_a_cycle(sample: Sample, v: FloatArray) -> tuple[float, float]:
     """Return what theory has particles of these speeds gain in a cycle on average, and its error.
 
-    s = log E1/E0 has mean and variance ~ 1/v, but for lags that fall a little more slowly. So v gains
-    v (mean s / 2 + mean s^2 / 8), much the same at every speed: the mean of v is linear in time, E quadratic.
-    Of speeds below the first one, at which rates may not be measured, that of the first is taken.
+    s = log E1/E0 has mean and variance ~ 1/v, but for lags that fall a little more slowly. So v
+    gains v (mean s / 2 + mean s^2 / 8), much the same at every speed: the mean of v is linear in
+    time, E quadratic. Of speeds below the first one, at which rates may not be measured, that of
+    the first is taken.
     """
-    scene, rows = scene_of(sample.run), []
+    scene = scene_of(sample.run)
+    rows = []
     grid = np.geomspace(max(np.quantile(v, SLOWEST), sample.speed), v.max(), N_SPEEDS)
     for speed in grid.tolist():
         found = theory.at_energy(scene, speed**2 / 2)
@@ -302,7 +341,10 @@ def _gain_of_a_cycle(sample: Sample, v: FloatArray) -> tuple[float, float]:
 
 
 def _doubling(half: FloatArray, whole: FloatArray) -> Mean:
-    """Return log2 of the means' ratio, its error from the ratio's to first order, the two being paired."""
+    """Return log2 of the means' ratio, with the ratio's error to first order.
+
+    The two means are paired.
+    """
     ratio = whole.mean() / half.mean()
     error = mean((whole - ratio * half) / half.mean()).error
     return Mean(math.log2(ratio), error / ratio / math.log(2))
@@ -313,5 +355,7 @@ CHECKS = {
     "C3": other_clocks,
     "C4": sliding,
     "C5": speeds,
-    "C10": partial(one_cycle, runs=(IRREGULAR,)),  # two turns in one period, not alike in shapes or times
+    "C10": partial(
+        one_cycle, runs=(IRREGULAR,)
+    ),  # two turns in one period, not alike in shapes or times
 }

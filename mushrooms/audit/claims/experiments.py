@@ -1,4 +1,4 @@
-"""The paper's experiments, measured in our simulations and held against theory: X1 to X8, X4 apart."""
+"""The paper's experiments, measured in our simulations, compared with theory: X1 to X8 but X4."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -39,9 +39,7 @@ from mushrooms.audit.tolerances import (
     spread,
     stated,
 )
-from scene.laws import bounds
 from scene.named import SCENES
-from scene.tables import laws
 
 MOVING = ("moving-cap@1e6", "moving-cap@1e7")
 MODE_BINS = np.linspace(-0.8, 1.1, 77)
@@ -49,47 +47,72 @@ TROUGH = 0.2  # of the density of s, between its modes
 
 
 def chord_time(sample: Sample) -> float:
-    """Return the longest time from one arc hit to the next: capture and release are seen at arc hits."""
-    return 2 * float(bounds(laws(scene_of(sample.run))["r"]).highest) / sample.speed
+    """Return the longest time from one arc hit to the next.
+
+    Capture and release are seen at arc hits.
+    """
+    return 2 * float(scene_of(sample.run).laws["r"].bounds().highest) / sample.speed
 
 
 def growth(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the mean of s with m1 and its finite-energy bias."""
     theirs = float(evidence.theory_of(sample).m1)
     return less_bias(
-        GROWTH, sample, theirs, scale=abs(theirs) or np.inf, against=(("no growth", 0.0) if theirs else None)
+        GROWTH,
+        sample,
+        theirs,
+        scale=abs(theirs) or np.inf,
+        against=(("no growth", 0.0) if theirs else None),
     )
 
 
 def escape(evidence: ClaimEvidence, sample: Sample) -> Check:
-    """Compare the uncaptured share with p_nc: particles that lag are captured more or less likely."""
-    theirs, s_nc = (float(getattr(evidence.theory_of(sample), name)) for name in ("p_nc", "log_e_nc"))
+    """Compare the uncaptured share with p_nc.
+
+    Particles that lag are captured more or less likely.
+    """
+    theirs, s_nc = (
+        float(getattr(evidence.theory_of(sample), name)) for name in ("p_nc", "log_e_nc")
+    )
     return less_bias(
         ESCAPE,
         sample,
         theirs,
         scale=0.1,
         against=(
-            ("that of the reversed cycle", theirs * np.exp(-s_nc)) if s_nc else ("nobody is captured", 1.0)
+            ("that of the reversed cycle", theirs * np.exp(-s_nc))
+            if s_nc
+            else ("nobody is captured", 1.0)
         ),
     )
 
 
 def peak_place(evidence: ClaimEvidence, sample: Sample) -> Check:
-    """Compare the mean energy of the uncaptured with log E_nc, less its drift and what others' lags add."""
+    """Compare the mean energy of the uncaptured with log E_nc.
+
+    Its drift, and what others' lags add, are taken off.
+    """
     theirs = float(evidence.theory_of(sample).log_e_nc)
     return less_bias(
-        PEAK, sample, theirs, scale=abs(theirs) or np.inf, against=("no bias", theirs - PEAK.bias(sample))
+        PEAK,
+        sample,
+        theirs,
+        scale=abs(theirs) or np.inf,
+        against=("no bias", theirs - PEAK.bias(sample)),
     )
 
 
 def peak_shape(sample: Sample) -> Check:
     """Test the uncaptured peak against the predicted one."""
-    kept, found = sample.gain[~sample.captured], predicted(sample)
+    kept = sample.gain[~sample.captured]
+    found = predicted(sample)
     what = f"{sample.run.name}: log E1/E0 of the never captured"
     still = norm(found.s_nc, found.peak[1] ** 0.5).cdf
-    note, rival = f"of a Gaussian at log E_nc {chance(kept, still):.1g}", ("a Gaussian at log E_nc", still)
-    return fits(what, kept, found.free_cdf, band=peak_band(found), scale=0.2, note=note, against=rival)
+    note = f"of a Gaussian at log E_nc {chance(kept, still):.1g}"
+    rival = ("a Gaussian at log E_nc", still)
+    return fits(
+        what, kept, found.free_cdf, band=peak_band(found), scale=0.2, note=note, against=rival
+    )
 
 
 def peak_width(sample: Sample) -> Check:
@@ -104,12 +127,16 @@ def peak_width(sample: Sample) -> Check:
 
 def captured_energies(sample: Sample) -> Check:
     """Test the captured's energies against the predicted ones."""
-    values, what = sample.gain[sample.captured], f"{sample.run.name}: log E1/E0 of the captured"
+    values = sample.gain[sample.captured]
+    what = f"{sample.run.name}: log E1/E0 of the captured"
     if len(values) < 2:
         return Check(what, None, "a sample", n_tests=1, note="no particles")
     sharp, found = adiabatic(sample).captured_cdf, predicted(sample).captured_cdf
-    note, rival = f"of the adiabatic theory {chance(values, sharp):.1g}", ("no blur", sharp)
-    return fits(what, values, found, band=captured_band(sample), scale=0.2, note=note, against=rival)
+    note = f"of the adiabatic theory {chance(values, sharp):.1g}"
+    rival = ("no blur", sharp)
+    return fits(
+        what, values, found, band=captured_band(sample), scale=0.2, note=note, against=rival
+    )
 
 
 def one_cycle(evidence: ClaimEvidence, runs: tuple[str, ...]) -> Iterator[Check]:
@@ -133,7 +160,10 @@ def moving_cap(evidence: ClaimEvidence) -> Iterator[Check]:
         *one_cycle(evidence, MOVING),
         close(
             "share never captured at 1e7 against the paper's 38.78 %",
-            (share(high.never_captured).value, float(np.hypot(share(high.never_captured).error, 0.00308))),
+            (
+                share(high.never_captured).value,
+                float(np.hypot(share(high.never_captured).error, 0.00308)),
+            ),
             0.3878,
             band=5e-5,
         ),
@@ -145,11 +175,17 @@ def moving_cap(evidence: ClaimEvidence) -> Iterator[Check]:
 
 
 def _modes(sample: Sample) -> Iterator[Check]:
-    """Look for the fullest bin on either side of the trough among those that theory may have the fullest."""
+    """Look for the fullest bin on either side of the trough.
+
+    Looked at are those that theory may have the fullest.
+    """
     counts = np.histogram(sample.gain, MODE_BINS)[0]
     expected = np.diff(predicted(sample).cdf(MODE_BINS)) * sample.n
     middle = (MODE_BINS[1:] + MODE_BINS[:-1]) / 2
-    for side, name in ((middle < TROUGH, "the left, of the uncaptured"), (middle >= TROUGH, "the right")):
+    for side, name in (
+        (middle < TROUGH, "the left, of the uncaptured"),
+        (middle >= TROUGH, "the right"),
+    ):
         top = expected[side].max()
         likely = middle[side & (expected >= top - N_SIGMA * (2 * top) ** 0.5)]
         found = float(middle[side][np.argmax(counts[side])])
@@ -165,7 +201,8 @@ def capture_times(evidence: ClaimEvidence) -> Iterator[Check]:
     """X3: when particles are captured."""
     for run in ("moving-cap@1e7", *FIXED):
         sample = evidence.sample(run)
-        times, found = sample.first_capture[0][sample.captured], predicted(sample)
+        times = sample.first_capture[0][sample.captured]
+        found = predicted(sample)
         seen = seen_late(found.capture_cdf, times, chord_time(sample))
         yield fits(
             f"{run}: times of capture",
@@ -179,14 +216,23 @@ def capture_times(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def ergodic(evidence: ClaimEvidence) -> list[Check]:
     """X5: c = 0."""
-    sample, earlier = evidence.sample("ergodic@1e7"), evidence.sample("ergodic@1e6")
-    found, left = predicted(sample), predicted(sample).theory_error
+    sample = evidence.sample("ergodic@1e7")
+    earlier = evidence.sample("ergodic@1e6")
+    found = predicted(sample)
+    left = predicted(sample).theory_error
     ratio = (found.peak[1] / predicted(earlier).peak[1]) ** 0.5
     return [
         less_bias(GROWTH, sample, 0.0, start=""),
-        fits("one peak, as predicted", sample.gain, found.free_cdf, band=peak_band(found), scale=0.2),
+        fits(
+            "one peak, as predicted", sample.gain, found.free_cdf, band=peak_band(found), scale=0.2
+        ),
         close("mean of E0/E1", mean(np.exp(-sample.gain)), found.mean_of_exp(-1), band=left.mean_s),
-        stated("nobody is captured", not sample.captured.any(), f"{sample.captured.sum()} captured", "0"),
+        stated(
+            "nobody is captured",
+            not sample.captured.any(),
+            f"{sample.captured.sum()} captured",
+            "0",
+        ),
         close(
             "its width shrinks as E0^(-1/4) from 1e6: ratio",
             spread(sample.gain).over(spread(earlier.gain)),
@@ -199,7 +245,8 @@ def ergodic(evidence: ClaimEvidence) -> list[Check]:
 
 def untilted(evidence: ClaimEvidence) -> list[Check]:
     """X6: with an upright stem the chaotic zone's energies are distributed differently."""
-    upright, tilted = evidence.sample("untilted@1e6"), evidence.sample("moving-cap@1e6")
+    upright = evidence.sample("untilted@1e6")
+    tilted = evidence.sample("moving-cap@1e6")
     centred = []
     for sample in (tilted, upright):
         kept = sample.gain[~sample.captured]
@@ -248,7 +295,8 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
         "retraced-arc@1e6: share captured in both of its windows",
         share(twice),
         (1 - float(theirs.p_nc) ** 0.5) ** 2,
-        band=predicted(retraced).theory_error.p_nc + abs(predicted(retraced).p_nc - float(theirs.p_nc)),
+        band=predicted(retraced).theory_error.p_nc
+        + abs(predicted(retraced).p_nc - float(theirs.p_nc)),
     )
     for parameter in ("radius", "depth", "mouth", "slope"):
         result = evidence.predict(SCENES[f"only-{parameter}"])
@@ -281,7 +329,8 @@ def both_ways(evidence: ClaimEvidence) -> Iterator[Check]:
         )
     for first, second in ((ACW, CW), ("moving-cap@1e6", "moving-cap-reversed@1e6")):
         pair = [evidence.sample(first), evidence.sample(second)]
-        kept, biases = [PEAK.measured(s) for s in pair], sum(PEAK.bias(s) for s in pair)
+        kept = [PEAK.measured(s) for s in pair]
+        biases = sum(PEAK.bias(s) for s in pair)
         yield close(
             f"{first} and its reverse: sum of the peaks, less their biases",
             (kept[0].value + kept[1].value - biases, float(np.hypot(kept[0].error, kept[1].error))),

@@ -1,7 +1,7 @@
 """Laws confirmed by measured exponents and through the cycle: L1 to L7.
 
-Exponents are fitted with the next order beside them, so that no band is needed for it. What is random carries
-its standard error, that of orbits drawn (L1, C6) too.
+Exponents are fitted with the next order beside them, so that no band is needed for it. What is
+random carries its standard error, that of orbits drawn (L1, C6) too.
 """
 
 from __future__ import annotations
@@ -30,11 +30,18 @@ from mushrooms.audit.claims.finite_energy import (
     zone_energy,
 )
 from mushrooms.audit.runs import RUNS, Sample, run_seed, scene_of
-from mushrooms.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
+from mushrooms.audit.tolerances import (
+    BoolArray,
+    FloatArray,
+    Mean,
+    close,
+    mean,
+    share,
+    spread,
+    stated,
+)
 from scene import Scene, State, load
 from scene.geometry import area, table_at
-from scene.laws import bounds, values
-from scene.tables import laws
 
 if TYPE_CHECKING:
     from fast import Collisions
@@ -42,7 +49,8 @@ if TYPE_CHECKING:
 SPEEDS = tuple(10.0 ** (k / 2) for k in range(4, 9))  # 100 to 10,000
 N_ORBITS = 12
 DURATION = 1.0  # of the 2 pi of a cycle: O(v) hits
-KT, HOTTER = 50.0, 2.0
+KT = 50.0
+HOTTER = 2.0
 N_POINTS = {"quick": 400_000, "full": 4_000_000}
 N_ENERGIES = {"quick": 400, "full": 2000}
 PER_ENERGY = 20
@@ -89,7 +97,7 @@ def impact_angle(evidence: ClaimEvidence) -> list[Check]:
 
 @lru_cache(maxsize=1)  # L1 and C6 look at the same
 def _orbits(follow: Callable[..., Collisions], seed: int) -> dict[str, FloatArray]:
-    """Return what changes along drawn orbits, (N_ORBITS, len(SPEEDS)) each, by the names of `_orbit`."""
+    """Return what changes along drawn orbits, by the names of `_orbit`: (N_ORBITS, len(SPEEDS))."""
     scene = load("breathing-circle")
     random = np.random.default_rng(run_seed(seed, RUNS["frozen-mushroom@1e8"], -3))
     starts = random.uniform((-0.6, 0.1, 0.0), (0.6, 0.7, 2 * np.pi), size=(N_ORBITS, 3)).tolist()
@@ -115,11 +123,13 @@ def _orbit(
     _, t, x_, y_, vx, vy = done.steps[at_arc].T
     momentum = np.abs(x_ * vy - y_ * vx)
     times = np.concatenate([t, (t[1:] + t[:-1]) / 2])
-    r, middle = np.split(values(scene.r, times), [len(t)])  # type: ignore[union-attr]
+    r, middle = np.split(scene.laws["r"].values(times), [len(t)])
     after = np.hypot(vx, vy)
     before = np.concatenate([[speed], after[:-1]])  # the base stands still
-    phi, flown = np.arcsin(momentum / (r * before)), np.arcsin(momentum[:-1] / (middle * after[:-1]))
-    product, u_over_v = before * r, values(scene.r, t, 1) / before  # type: ignore[union-attr]
+    phi = np.arcsin(momentum / (r * before))
+    flown = np.arcsin(momentum[:-1] / (middle * after[:-1]))
+    product = before * r
+    u_over_v = scene.laws["r"].values(t, 1) / before
     turned = np.arcsin(momentum / (r * after)) - phi - 2 * u_over_v * np.sin(phi)
     slowed = after / before - 1 + 2 * u_over_v * np.cos(phi)
     return {
@@ -135,7 +145,9 @@ def _orbit(
 
 def _orbits_exponent(what: str, rows: FloatArray, exponent: int) -> Check:
     """Compare the exponent of v with an expected one; its error is of the mean over orbits."""
-    fits = [theory.fit_power(SPEEDS, row, np.full(len(row), 0.1), (-1.0, -2.0)).exponent for row in rows]
+    fits = [
+        theory.fit_power(SPEEDS, row, np.full(len(row), 0.1), (-1.0, -2.0)).exponent for row in rows
+    ]
     return close(
         f"{what}: exponent of v, {len(rows)} orbits",
         mean(fits),
@@ -150,16 +162,25 @@ def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
     captured = evidence.samples(*LADDER[1:6])
     widths = [spread(cap_change(sample)) for sample in captured]
     yield _exponent(
-        "log(E V_cap) of captured particles, phase 7/16 to 9/16: spread against E0", captured, widths, -0.5
+        "log(E V_cap) of captured particles, phase 7/16 to 9/16: spread against E0",
+        captured,
+        widths,
+        -0.5,
     )
     high = captured[-2]
-    # E is seen since the last hit, half a chord before on average, in which log V_cap changes by 2 u/v.
-    arc = bounds(laws(scene_of(high.run))["r"]).slope
-    yield close(f"{high.run.name}: its mean", mean(cap_change(high)), 0.0, band=2 * arc / high.speed)
+    # E is seen since the last hit, half a chord before on average, in which log V_cap changes by 2
+    # u/v.
+    arc = scene_of(high.run).laws["r"].bounds().slope
+    yield close(
+        f"{high.run.name}: its mean", mean(cap_change(high)), 0.0, band=2 * arc / high.speed
+    )
     free = evidence.samples(*ERGODIC)
     changes = [sample.phase_s[:, 0, 3] + log_volume(sample, 0.5) for sample in free]
     yield _exponent(
-        "c = 0, log(E V) at half a cycle: spread against E0", free, [spread(c) for c in changes], -0.25
+        "c = 0, log(E V) at half a cycle: spread against E0",
+        free,
+        [spread(c) for c in changes],
+        -0.25,
     )
     found = predicted(free[-1])
     yield close(
@@ -172,7 +193,9 @@ def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def cap_change(sample: Sample) -> FloatArray:
     """Return the change of log(E V_cap) from phase 7/16 to 9/16 of those in the island at both."""
-    volumes = [theory.volumes_at(fp, scene_of(sample.run), 2 * fp.pi * k / 16).v_cap for k in (7, 9)]
+    volumes = [
+        theory.volumes_at(fp, scene_of(sample.run), 2 * fp.pi * k / 16).v_cap for k in (7, 9)
+    ]
     return captured_change(sample, 6, 8) + math.log(volumes[1] / volumes[0])
 
 
@@ -184,8 +207,12 @@ def log_volume(sample: Sample, phase: float) -> float:
 
 
 def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: float) -> Check:
-    """Compare the exponent of E0 with an expected one, the next order, ~ 1/v, being fitted beside it."""
-    fit, energies = fitted(samples, values, -0.5), [sample.run.energy for sample in samples]
+    """Compare the exponent of E0 with an expected one.
+
+    The next order, ~ 1/v, is fitted beside it.
+    """
+    fit = fitted(samples, values, -0.5)
+    energies = [sample.run.energy for sample in samples]
     return close(
         what,
         (fit.exponent, fit.exponent_error),
@@ -197,7 +224,7 @@ def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: fl
 
 
 def volumes(evidence: ClaimEvidence) -> Iterator[Check]:
-    """L3: volumes as shares of random phase points, and of particles that stay in the frozen cap."""
+    """L3: volumes as shares of random phase points, and of particles that stay in a frozen cap."""
     n = N_POINTS[evidence.size]
     random = np.random.default_rng(run_seed(evidence.seed, RUNS["frozen-mushroom@1e8"], -1))
     scene = load("moving-cap")
@@ -208,7 +235,9 @@ def volumes(evidence: ClaimEvidence) -> Iterator[Check]:
         label = f"moving cap at {phase:g} of its cycle"
         yield from [
             close(f"{label}: V_cap / V", share(in_cap[inside]), now.v_cap / total),
-            close(f"{label}: V_ell / V_cap", share(in_island[inside & in_cap]), now.v_ell / now.v_cap),
+            close(
+                f"{label}: V_ell / V_cap", share(in_island[inside & in_cap]), now.v_ell / now.v_cap
+            ),
         ]
     for sample in evidence.samples("frozen-mushroom@1e8", "frozen-untilted@1e8"):
         still = theory.volumes_at(fp, scene_of(sample.run), 0.0)
@@ -226,8 +255,12 @@ def _points(
 ) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Draw points in a box around the table; tell which lie in it, in the cap, in the island."""
     table = table_at(fp, scene, t)
-    r, h, w = table.r, table.h, table.w
-    x, y, turn = random.uniform(-r, r, n), random.uniform(-h, r, n), random.uniform(0, 2 * np.pi, n)
+    r = table.r
+    h = table.h
+    w = table.w
+    x = random.uniform(-r, r, n)
+    y = random.uniform(-h, r, n)
+    turn = random.uniform(0, 2 * np.pi, n)
     in_cap = (y >= 0) & (table.gap("arc", x, y) >= 0)
     in_stem = (y < 0) & (np.abs(x) <= table.half_width(y))
     momentum = np.abs(x * np.sin(turn) - y * np.cos(turn))
@@ -257,14 +290,17 @@ def release(evidence: ClaimEvidence) -> list[Check]:
 def _largest_gap(sample: Sample) -> float:
     """Return a bound on |nu(t_out) - nu(t_in)| v for the moving cap, to the first order in 1/v.
 
-    Capture and release are each seen up to a chord late, 2 r/v, in which nu changes by its rate times that.
-    Meanwhile v r changes relatively by up to (1/v) (2 u + the integral of u^2/r): at each hit the radius has
-    moved by r'' dt^2 / 2 beyond what the speed lost, dt = 2 r cos(phi)/v; and sin(phi) = L/(v r) as much.
+    Capture and release are each seen up to a chord late, 2 r/v, in which nu changes by its rate
+    times that. Meanwhile v r changes relatively by up to (1/v) (2 u + the integral of u^2/r): at
+    each hit the radius has moved by r'' dt^2 / 2 beyond what the speed lost, dt = 2 r cos(phi)/v;
+    and sin(phi) = L/(v r) as much.
     """
     scene = scene_of(sample.run)
-    arc, mouth = bounds(laws(scene)["r"]), bounds(laws(scene)["nu"])
+    arc = scene.laws["r"].bounds()
+    mouth = scene.laws["nu"].bounds()
     return float(
-        2 * 2 * arc.highest * mouth.slope + (2 * arc.slope + scene.period * arc.slope**2 / arc.lowest)
+        2 * 2 * arc.highest * mouth.slope
+        + (2 * arc.slope + scene.period * arc.slope**2 / arc.lowest)
     )
 
 
@@ -280,7 +316,8 @@ def energy_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
         sample = evidence.sample(run)
         times, means = zone_energy(sample)
         found = predicted(sample)
-        expected, wait = found.zone(times)[0], found.zone(np.array(times) - chord_time(sample))[0]
+        expected = found.zone(times)[0]
+        wait = found.zone(np.array(times) - chord_time(sample))[0]
         for k in range(every - 1, len(times), every):
             yield close(
                 f"{run}: mean log E/E0 at phase {sample.run.phases[k]:g}",
@@ -294,8 +331,12 @@ def energy_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
 
 
 def _lag_at_capture(sample: Sample) -> Check:
-    """Compare log E of captured particles, which a cap at rest keeps, with what they had when captured."""
-    found, times = predicted(sample), sample.first_capture[0]
+    """Compare log E of captured particles with what they had when captured.
+
+    A cap at rest keeps it.
+    """
+    found = predicted(sample)
+    times = sample.first_capture[0]
     k = int(np.argmax(sample.phase_captured[:, 0].sum(axis=0)))
     inside = sample.phase_captured[:, 0, k] & sample.captured
     expected = found.at_capture(times[inside])[0]
@@ -322,9 +363,12 @@ def population_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
     """L6: p_cha(t) against eq. (ps), with what lags do to it."""
     for run, every in (("moving-cap@1e7", 2), (ACW, 1), ("fixed-cap-anticlockwise@1e7", 1)):
         sample = evidence.sample(run)
-        times, wait = np.array(phase_times(sample)), chord_time(sample)
-        expected, earlier = share_in_the_zone(sample, times), share_in_the_zone(sample, times - wait)
-        measured, left = zone_share(sample, times), predicted(sample).theory_error
+        times = np.array(phase_times(sample))
+        wait = chord_time(sample)
+        expected = share_in_the_zone(sample, times)
+        earlier = share_in_the_zone(sample, times - wait)
+        measured = zone_share(sample, times)
+        left = predicted(sample).theory_error
         for k in range(every - 1, len(times), every):
             p = float(expected[k])
             error = math.sqrt(max(p * (1 - p), 1 / sample.n) / sample.n)
@@ -333,7 +377,9 @@ def population_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
                 (float(measured[k]), error),
                 p,
                 band=abs(p - float(earlier[k])) + left.p_nc,
-                against=("nobody is captured", 1.0) if p < 0.99 else ("nobody is released", expected.min()),
+                against=("nobody is captured", 1.0)
+                if p < 0.99
+                else ("nobody is released", expected.min()),
             )
 
 
@@ -342,7 +388,8 @@ def work(evidence: ClaimEvidence) -> Iterator[Check]:
     phases = (0.25, 0.5, 0.75)
     scene = load("moving-cap")
     random = np.random.default_rng(run_seed(evidence.seed, RUNS["moving-cap@1e3"], -1))
-    rows, n_lost = [], 0
+    rows = []
+    n_lost = 0
     for k, energy in enumerate(random.exponential(HOTTER * KT, N_ENERGIES[evidence.size])):
         seed = run_seed(evidence.seed, RUNS["moving-cap@1e3"], -2 - k)
         done = evidence.steppers.simulate(
@@ -355,7 +402,8 @@ def work(evidence: ClaimEvidence) -> Iterator[Check]:
         )
         ends = np.column_stack([done.phase_energies[:, 0], done.energy])[done.outcome == 0]
         n_lost += PER_ENERGY - len(ends)
-        # Energies are drawn at HOTTER times kT and weighted back: a few fast particles would carry the mean.
+        # Energies are drawn at HOTTER times kT and weighted back: a few fast particles would carry
+        # the mean.
         rows.append(np.mean(HOTTER * np.exp(energy / (HOTTER * KT) - ends / KT), axis=0))
     alike = math.exp(-evidence.predict("moving-cap").m1)
     for k, phase in enumerate((*phases, 1.0)):

@@ -1,8 +1,8 @@
-"""What finite energy makes of the theory's figures, and what the paper says about it: M5 to M9 and M11.
+"""What finite energy makes of the theory's figures, and what the paper says: M5 to M9, M11.
 
-For a sample's scene and energy everything is `theory.at_energy`, with nothing fitted: diffusion and lags from
-frozen tables (theory/equations.md, "Finite energy"). A band is how far that theory says a figure may be off
-(`theory_error`): nothing is measured on the samples that it judges.
+For a sample's scene and energy everything is `theory.at_energy`, with nothing fitted: diffusion and
+lags from frozen tables (theory/equations.md, "Finite energy"). A band is how far that theory says a
+figure may be off (`theory_error`): nothing is measured on the samples that it judges.
 """
 
 import math
@@ -35,11 +35,14 @@ from scene import load
 INFINITE = 1e40  # energy at which nothing is left of shifts and diffusion
 N_PLACES = 2001
 PEAK_DENSITY = 0.3989  # of the normal density at its centre, times its width
-WIDENED = 0.121  # largest change of the normal distribution function per relative change of the variance
+WIDENED = (
+    0.121  # largest change of the normal distribution function per relative change of the variance
+)
 SKEWED = 0.0665  # and per skewness
 N_DRAWN = 400_000  # sums of cycles: their own error is a fifth of that of 16,000 particles
 DRAWN_SEED = 20140317
-ACW, CW = "fixed-cap-anticlockwise@1e9", "fixed-cap-clockwise@1e9"
+ACW = "fixed-cap-anticlockwise@1e9"
+CW = "fixed-cap-clockwise@1e9"
 LADDER = tuple(f"moving-cap@1e{k}" for k in range(3, 12))
 ERGODIC = tuple(f"ergodic@1e{k}" for k in range(4, 8))
 FIXED = (ACW, CW, "fixed-cap-anticlockwise@1e7", "fixed-cap-clockwise@1e7")
@@ -107,7 +110,12 @@ PEAK = Figure(
 
 
 def less_bias(
-    figure: Figure, sample: Sample, expected: float, start: str | None = None, end: str = "", **options: Any
+    figure: Figure,
+    sample: Sample,
+    expected: float,
+    start: str | None = None,
+    end: str = "",
+    **options: Any,
 ) -> Check:
     """Compare a figure, less what finite energy adds to it, with that of infinite energy.
 
@@ -137,7 +145,8 @@ def width(sample: Sample) -> Mean:
 
 def width_as_predicted(what: str, found: Mean, sample: Sample, **options: Any) -> Check:
     """Compare the width of a sample's peak with that which frozen tables predict."""
-    sigma, left = predicted(sample).peak[1] ** 0.5, predicted(sample).theory_error
+    sigma = predicted(sample).peak[1] ** 0.5
+    left = predicted(sample).theory_error
     return close(what, found, sigma, band=sigma * left.variance / 2, **options)
 
 
@@ -149,16 +158,21 @@ def peak_band(found: theory.FiniteEnergy) -> float:
 
 
 def captured_band(sample: Sample) -> float:
-    """Return the same of the captured: a kernel's change moves them no more than it does the peak."""
+    """Return the same of the captured.
+
+    A kernel's change moves them no more than it does the peak.
+    """
     found = predicted(sample)
-    gains, left = sample.gain[sample.captured], found.theory_error
+    gains = sample.gain[sample.captured]
+    left = found.theory_error
     steep = steepest(found.captured_cdf, gains.min(), gains.max())
     return steep * left.captured_mean + WIDENED * left.variance + SKEWED * left.skewness
 
 
 def zone_energy(sample: Sample) -> tuple[list[float], list[Mean]]:
     """Return times of the phases, and mean log E/E0 of those not captured so far."""
-    times, means = phase_times(sample), []
+    times = phase_times(sample)
+    means = []
     for k, time in enumerate(times):
         with np.errstate(invalid="ignore"):
             free = ~sample.captured | (time < sample.first_capture[0])
@@ -173,7 +187,7 @@ def phase_times(sample: Sample) -> list[float]:
 
 
 def captured_change(sample: Sample, first: int, last: int) -> FloatArray:
-    """Return the change of log E from one of the run's phases to another of those captured throughout."""
+    """Return the change of log E between two phases of the run for those captured throughout."""
     begin, end = (phase_times(sample)[k] for k in (first, last))
     with np.errstate(invalid="ignore"):
         inside = (sample.first_capture[0] < begin) & (sample.first_capture[1] > end)
@@ -181,8 +195,9 @@ def captured_change(sample: Sample, first: int, last: int) -> FloatArray:
 
 
 def share_in_the_zone(sample: Sample, times: FloatArray) -> FloatArray:
-    """Return the predicted share of particles in the chaotic zone, for cycles with a single well."""
-    curve, found = theory.capture_curve(scene_of(sample.run), N_PLACES), predicted(sample)
+    """Return the predicted share of particles in the chaotic zone, for a cycle with one well."""
+    curve = theory.capture_curve(scene_of(sample.run), N_PLACES)
+    found = predicted(sample)
     # Who was captured first is released last: inside are those captured before this time.
     latest = np.minimum(times, np.interp(times, curve.t_out[::-1], curve.t_in[::-1]))
     return np.asarray(1 - (1 - found.p_nc) * found.capture_cdf(latest), dtype=np.float64)
@@ -198,7 +213,8 @@ class Sums:
 
     def __init__(self, drawn: FloatArray) -> None:
         self.values: FloatArray = np.sort(drawn)
-        self.mean, self.sd = float(drawn.mean()), float(drawn.std())
+        self.mean = float(drawn.mean())
+        self.sd = float(drawn.std())
 
     @property
     def cdf(self) -> Cdf:
@@ -215,10 +231,12 @@ def summed(run: str, n_cycles: int) -> Sums:
 
 
 def period(evidence: ClaimEvidence) -> Iterator[Check]:
-    """M5: for which period of sec. 4.1 the printed error bars come out, given our widths at T = 1."""
-    lowest, highest = 0.0, np.inf
+    """M5: the period of sec. 4.1 for which our widths at T = 1 give the printed error bars."""
+    lowest = 0.0
+    highest = np.inf
     for name in (ACW, CW):
-        sample, (_, bar, n, per_bar) = evidence.sample(name), PRINTED[name]
+        sample = evidence.sample(name)
+        _, bar, n, per_bar = PRINTED[name]
         sd, error = _spread_beside(sample, n)
         sharp = float(evidence.theory_of(sample).sd)
         extra = sd**2 - sharp**2  # ~ 1 / (v T)
@@ -232,7 +250,8 @@ def period(evidence: ClaimEvidence) -> Iterator[Check]:
             f"{name}: variance of s beyond the adiabatic one, at T = 1",
             (extra, 2 * sd * error),
             found.variance_s - adiabatic(sample).variance_s,
-            band=found.theory_error.variance * found.peak[1] + 2 * sharp * found.theory_error.captured_mean,
+            band=found.theory_error.variance * found.peak[1]
+            + 2 * sharp * found.theory_error.captured_mean,
             note="expected: what diffusion and lags add, by the theory of finite energy",
         )
     yield stated(
@@ -244,7 +263,7 @@ def period(evidence: ClaimEvidence) -> Iterator[Check]:
 
 
 def error_bars(evidence: ClaimEvidence) -> Iterator[Check]:
-    """M6: how many sigma_N the printed error bars are, and whether the printed means agree with ours."""
+    """M6: how many sigma_N the printed error bars are, and whether the printed means are ours."""
     for name, (m1, bar, n, per_bar) in PRINTED.items():
         sample = evidence.sample(name)
         sd, error = _spread_beside(sample, n)
@@ -252,7 +271,9 @@ def error_bars(evidence: ClaimEvidence) -> Iterator[Check]:
             measured = (count * sd / np.sqrt(n), count * error / np.sqrt(n))
             form: Form = "corrected" if count == per_bar else "printed"
             if form == "corrected" or per_bar == 3:
-                yield close(f"{name}: {count} sigma_N", measured, bar, band=half_unit(bar), form=form)
+                yield close(
+                    f"{name}: {count} sigma_N", measured, bar, band=half_unit(bar), form=form
+                )
         ours = mean(sample.gain)
         both = float(np.hypot(ours.error, float(bar) / per_bar))
         yield close(
@@ -266,7 +287,7 @@ def error_bars(evidence: ClaimEvidence) -> Iterator[Check]:
 
 
 def _spread_beside(sample: Sample, n: int) -> Mean:
-    """Return our standard deviation with the error of its difference from one measured on n particles."""
+    """Return our standard deviation, with the error of its difference from one of n particles."""
     sd, error = spread(sample.gain)
     return Mean(sd, error * float(np.sqrt(1 + len(sample.gain) / n)))
 
@@ -275,9 +296,11 @@ def width_exponent(evidence: ClaimEvidence) -> Iterator[Check]:
     """M7: the exponent of the peak's width."""
     for label, runs in WIDTHS:
         samples = evidence.samples(*runs)
-        fit, band = fitted(samples, [width(sample) for sample in samples]), _bend(samples)
+        fit = fitted(samples, [width(sample) for sample in samples])
+        band = _bend(samples)
         energies = [sample.run.energy for sample in samples]
-        text = f"E0 {energies[0]:.0e} to {energies[-1]:.0e}: {fit.coefficient:.3g} E0^{fit.exponent:.4f}"
+        reach = f"E0 {energies[0]:.0e} to {energies[-1]:.0e}"
+        text = f"{reach}: {fit.coefficient:.3g} E0^{fit.exponent:.4f}"
         measured = (fit.exponent, fit.exponent_error)
         yield from [
             close(f"{label}: exponent +1/4", measured, 0.25, band=band, form="printed", note=text),
@@ -291,10 +314,13 @@ def width_exponent(evidence: ClaimEvidence) -> Iterator[Check]:
                 against=("-1/2", -0.5),
             ),
         ]
-        other = fitted(samples, [spread(s.speed * np.exp(s.gain[~s.captured] / 2)) for s in samples])
+        other = fitted(
+            samples, [spread(s.speed * np.exp(s.gain[~s.captured] / 2)) for s in samples]
+        )
         yield from [
             close(
-                f"{label}: the width of the speeds has exponent +1/4, as printed for that of the peak",
+                f"{label}: the width of the speeds has exponent +1/4, as printed for that of the"
+                " peak",
                 (other.exponent, other.exponent_error),
                 0.25,
                 band=band,
@@ -322,7 +348,10 @@ def _bend(samples: list[Sample]) -> float:
 
 
 def fitted(samples: list[Sample], values: list[Mean], *orders: float) -> theory.PowerFit:
-    """Fit a power of the energy to what was measured on samples, with other powers relative to it beside."""
+    """Fit a power of the energy to what was measured on samples.
+
+    Other powers, relative to it, are fitted beside it.
+    """
     found, errors = np.array(values).T
     return theory.fit_power([sample.run.energy for sample in samples], found, errors, orders)
 
@@ -330,7 +359,9 @@ def fitted(samples: list[Sample], values: list[Mean], *orders: float) -> theory.
 def ergodic_mean(evidence: ClaimEvidence) -> list[Check]:
     """M8: |m1*| < 3e-5 for c = 0."""
     sample = evidence.sample("ergodic@1e7")
-    sd, found, theirs = spread(sample.gain), mean(sample.gain), predicted(sample)
+    sd = spread(sample.gain)
+    found = mean(sample.gain)
+    theirs = predicted(sample)
     chance = sd.value / np.sqrt(25_000)
     drift = theirs.mean_s
     luck, more = (float(np.diff(norm.cdf([-x, x], drift, chance))[0]) for x in (3e-5, 3e-4))
@@ -366,14 +397,18 @@ def ergodic_mean(evidence: ClaimEvidence) -> list[Check]:
 
 def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
     """M9: the mean of s is biased at finite energy; the mean of exp(-s/2) is not."""
-    low, *samples = evidence.samples(*LADDER)  # the lowest is below the speeds of the theory of finite energy
+    # The lowest is below the speeds of the theory of finite energy.
+    low, *samples = evidence.samples(*LADDER)
     theirs = float(evidence.predict("moving-cap").m1)
     yield close(f"{low.run.name}: mean of s is m1, no bias", mean(low.gain), theirs, form="printed")
     values, errors = np.array([mean(sample.gain) for sample in samples]).T
     energies = [sample.run.energy for sample in samples]
     fit = theory.extrapolate(energies, values, errors)
-    text = f"m1* = m1 + {fit.slope:.2f} E0^(-1/2), chi² = {fit.chi_square:.1f} for {len(samples) - 2}"
-    # Lags fall more slowly than E0^(-1/2): so far theory's own means, fitted alike, miss their limit.
+    text = (
+        f"m1* = m1 + {fit.slope:.2f} E0^(-1/2), chi² = {fit.chi_square:.1f} for {len(samples) - 2}"
+    )
+    # Lags fall more slowly than E0^(-1/2): so far theory's own means, fitted alike, miss their
+    # limit.
     bent = theory.extrapolate(energies, [predicted(sample).mean_s for sample in samples], errors)
     yield close(
         "limit of the mean of s as E0 grows",
@@ -385,7 +420,8 @@ def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
     )
     half = float(theory.unbiased_mean(load("moving-cap")))
     for sample in samples:
-        added, left = GROWTH.bias(sample), GROWTH.band(sample)
+        added = GROWTH.bias(sample)
+        left = GROWTH.band(sample)
         yield from [
             close(
                 f"{sample.run.name}: mean of s, less the predicted bias {added:.2g}",

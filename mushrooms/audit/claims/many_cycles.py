@@ -1,6 +1,7 @@
 """What grows over cycles, and what does not: X4, C1, C9, D1 and C11 to C15.
 
-Sums of cycles are held against sums drawn from theory, and a Gaussian; cycles against their reverses.
+Sums of cycles are held against sums drawn from theory, and a Gaussian; cycles against their
+reverses.
 """
 
 from collections.abc import Iterator
@@ -40,12 +41,15 @@ from scene.transforms import backwards
 
 MANY = ("moving-cap@1e5x30", "moving-cap@1e7x30")
 INTEGRABLE = ("fermi-ulam@1e3x400", "breathing-circle@1e3x400")
-LARGEST = 0.1  # of |log E/E0|: a fortieth of what the moving cap gains in as many cycles in the mean
+LARGEST = (
+    0.1  # of |log E/E0|: a fortieth of what the moving cap gains in as many cycles in the mean
+)
 WITHOUT_FLUX = ("flux-free@1e6", "only-depth@1e6", "only-slope@1e6")
 GROWTH = 0.01  # of log E in a cycle, which would be seen
 N_PARTS = 3  # of the cycles, in each of which entropy is to grow
 N_REVERSED = {"quick": 20_000, "full": 100_000}
-REVERSED_ENERGY, N_BINS = 1e3, 10
+REVERSED_ENERGY = 1e3
+N_BINS = 10
 FULL_BIN = 20
 TAILED = 10  # cycles, after which tails are told from a Gaussian's
 
@@ -60,8 +64,12 @@ def sums(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def _sum_of(sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
     label = f"{sample.run.name}, n = {n}"
-    total, sums, left = sample.s[:, n - 1], summed(sample.run.name, n), predicted(sample).theory_error
-    m1, centre, scale = cumulants[1], sums.mean, sums.sd
+    total = sample.s[:, n - 1]
+    sums = summed(sample.run.name, n)
+    left = predicted(sample).theory_error
+    m1 = cumulants[1]
+    centre = sums.mean
+    scale = sums.sd
     bias = centre - n * m1
     per_cycle = Mean((mean(total).value - bias) / n, mean(total).error / n)
     own = scale / N_DRAWN**0.5  # the drawn sums' standard error
@@ -69,7 +77,8 @@ def _sum_of(sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
     places = np.linspace(sums.values[0], sums.values[-1], 2000)
     gap = float(np.max(np.abs(sums.cdf(places) - norm.cdf(places, centre, scale))))
     inner, theirs = (np.abs(x - centre) < scale for x in (total, sums.values))
-    z, drawn = (total - centre) / scale, (sums.values - centre) / scale
+    z = (total - centre) / scale
+    drawn = (sums.values - centre) / scale
     return [
         close(
             f"{label}: mean of log E_n/E0 over n, less its bias {bias / n:.5f}",
@@ -106,14 +115,16 @@ def _sum_of(sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
             band=N_SIGMA * mean(drawn**3).error,
         ),
         stated(
-            f"{label}: the tails are no Gaussian's, by theory", *_tails(scene_of(sample.run), n, cumulants)
+            f"{label}: the tails are no Gaussian's, by theory",
+            *_tails(scene_of(sample.run), n, cumulants),
         ),
     ]
 
 
 def _tails(scene: Scene, n: int, cumulants: list[float]) -> tuple[bool, str, str]:
     """Weigh the tails of the adiabatic sums, those of high energies."""
-    sums, scale = theory.sum_of_cycles(scene, n), (n * cumulants[2]) ** 0.5
+    sums = theory.sum_of_cycles(scene, n)
+    scale = (n * cumulants[2]) ** 0.5
     left, right = (float(sums.cdf(n * cumulants[1] + side * 3 * scale)) for side in (-1, 1))
     normal = float(norm.cdf(-3))
     ratios = left / normal, (1 - right) / normal
@@ -127,7 +138,8 @@ def _tails(scene: Scene, n: int, cumulants: list[float]) -> tuple[bool, str, str
 def tails(evidence: ClaimEvidence) -> Iterator[Check]:
     """C9: most of the captured gain; after many cycles the tails are not a Gaussian's."""
     sample = evidence.sample("moving-cap@1e7")
-    found, gain = predicted(sample), sample.gain[sample.captured]
+    found = predicted(sample)
+    gain = sample.gain[sample.captured]
     theirs = 1 - float(found.captured_cdf(np.zeros(1))[0])
     yield close(
         "moving-cap@1e7: share of the captured that gain energy",
@@ -144,18 +156,23 @@ def tails(evidence: ClaimEvidence) -> Iterator[Check]:
 def _told_from_a_gaussian(sample: Sample, n: int) -> Check:
     """Weigh log E_n/E0 between the theory's sums and a Gaussian of their mean and width.
 
-    The logarithm of the likelihoods' ratio tells two distributions apart better than any other number. After
-    more cycles, or slower ones that diffuse more, sums are too near a Gaussian for so many particles to tell.
+    The logarithm of the likelihoods' ratio tells two distributions apart better than any other
+    number. After more cycles, or slower ones that diffuse more, sums are too near a Gaussian for so
+    many particles to tell.
     """
-    label, sums = f"{sample.run.name}, n = {n}", summed(sample.run.name, n)
+    label = f"{sample.run.name}, n = {n}"
+    sums = summed(sample.run.name, n)
     total, drawn = ((x - sums.mean) / sums.sd for x in (sample.s[:, n - 1], sums.values))
     edges = np.linspace(-3.5, 3.5, 29)
     counts, likely = (
-        np.bincount(np.searchsorted(edges, x), minlength=len(edges) + 1).astype(float) for x in (total, drawn)
+        np.bincount(np.searchsorted(edges, x), minlength=len(edges) + 1).astype(float)
+        for x in (total, drawn)
     )
-    p, q = likely / likely.sum(), np.diff(norm.cdf([-np.inf, *edges, np.inf]))
+    p = likely / likely.sum()
+    q = np.diff(norm.cdf([-np.inf, *edges, np.inf]))
     weight = np.log(p / q)
-    mine, its = float(p @ weight), float(q @ weight)
+    mine = float(p @ weight)
+    its = float(q @ weight)
     error = (float(p @ weight**2) - mine**2) ** 0.5 / len(total) ** 0.5
     return close(
         f"{label}: mean log of the likelihoods, theory's over a Gaussian's",
@@ -176,7 +193,8 @@ def _told_from_a_gaussian(sample: Sample, n: int) -> Check:
 def independence(evidence: ClaimEvidence) -> Iterator[Check]:
     """C1: cycles are independent, so log E_n/E0 is a sum of as many like variables."""
     for sample in evidence.samples(*MANY):
-        n, run = sample.run.n_cycles, sample.run.name
+        n = sample.run.n_cycles
+        run = sample.run.name
         drawn = _gains(predicted(sample).draw(n, N_DRAWN // n, DRAWN_SEED))
         for label, first, second in (
             ("one", slice(None, -1), slice(1, None)),
@@ -197,7 +215,8 @@ def independence(evidence: ClaimEvidence) -> Iterator[Check]:
         ratio = spread(sample.s[:, -1]).over(spread(sample.s[:, 0]))
         theirs = spread(drawn.sum(axis=1)).over(spread(drawn[:, 0]))
         yield close(
-            f"{run}: spread of log E_n/E0 over that of one cycle, sqrt(n) but for the first's wider blur",
+            f"{run}: spread of log E_n/E0 over that of one cycle, sqrt(n) but for the first's wider"
+            " blur",
             ratio,
             theirs.value,
             band=N_SIGMA * theirs.error,
@@ -217,13 +236,18 @@ def _correlation(x: FloatArray, y: FloatArray) -> Mean:
 def losses(evidence: ClaimEvidence) -> Iterator[Check]:
     """D1: how many end with less energy than they began with."""
     scene = scene_of(RUNS[MANY[0]])
-    one, other = theory.rarity(scene), theory.rarity(theory.reversed_cycle(scene))
+    one = theory.rarity(scene)
+    other = theory.rarity(theory.reversed_cycle(scene))
     yield exact(
-        "P(E_n < E0) falls as exp(-n I), and so does the reverse's: I by theory", other.rate, one.rate, 1e-14
+        "P(E_n < E0) falls as exp(-n I), and so does the reverse's: I by theory",
+        other.rate,
+        one.rate,
+        1e-14,
     )
     for sample in evidence.samples(*MANY):
         for n in sorted({1, 10, sample.run.n_cycles}):
-            lost, sums = share(sample.s[:, n - 1] < 0), summed(sample.run.name, n)
+            lost = share(sample.s[:, n - 1] < 0)
+            sums = summed(sample.run.name, n)
             theirs = share(sums.values < 0)
             adiabatic = theory.loss_probability(scene, n)
             # Who ends near E0 is moved across it by what finite energy leaves out.
@@ -261,7 +285,9 @@ def without_flux(evidence: ClaimEvidence) -> Iterator[Check]:
     for sample in evidence.samples(*WITHOUT_FLUX):
         yield from _no_growth(sample)
         n = int(sample.captured.sum())
-        yield stated(f"{sample.run.name}: captured on the way", n == 0, f"{n} of {sample.n}", "nobody")
+        yield stated(
+            f"{sample.run.name}: captured on the way", n == 0, f"{n} of {sample.n}", "nobody"
+        )
 
 
 def radius_alone(evidence: ClaimEvidence) -> list[Check]:
@@ -270,10 +296,16 @@ def radius_alone(evidence: ClaimEvidence) -> list[Check]:
 
 
 def _no_growth(sample: Sample) -> list[Check]:
-    """Hold theory to m1 = 0, and particles to a mean of exp(-s/2) that finite energy does not bias."""
-    limit, kept = theory.predict(scene_of(sample.run)), np.exp(-sample.gain[sample.takes_part] / 2)
+    """Check that theory has m1 = 0, and particles a mean of exp(-s/2).
+
+    Finite energy does not bias that mean.
+    """
+    limit = theory.predict(scene_of(sample.run))
+    kept = np.exp(-sample.gain[sample.takes_part] / 2)
     return [
-        stated(f"{sample.run.name}: theory", limit.m1 == 0, f"m1 = {float(limit.m1):.1g}", "m1 = 0"),
+        stated(
+            f"{sample.run.name}: theory", limit.m1 == 0, f"m1 = {float(limit.m1):.1g}", "m1 = 0"
+        ),
         close(
             f"{sample.run.name}: mean of exp(-s/2), which finite energy leaves at 1",
             mean(kept),
@@ -297,7 +329,8 @@ def entropy(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def reversal(evidence: ClaimEvidence) -> list[Check]:
     """C15: W(E0, E1) of a cycle is W(E1, E0) of its reverse, exactly, for phase volume is kept."""
-    scene, n = load("moving-cap"), N_REVERSED[evidence.size]
+    scene = load("moving-cap")
+    n = N_REVERSED[evidence.size]
     low, high = REVERSED_ENERGY * np.exp([-1.0, 1.0])
     edges = np.geomspace(low, high, N_BINS + 1)
     forward, backward = (
@@ -313,7 +346,8 @@ def reversal(evidence: ClaimEvidence) -> list[Check]:
     bound = float(chi2.isf(LEVEL, n_bins))
     return [
         Check(
-            f"moving cap and its reverse at {REVERSED_ENERGY:g}: chi square of {n_bins} bins of (E0, E1)",
+            f"moving cap and its reverse at {REVERSED_ENERGY:g}: chi square of {n_bins} bins of"
+            " (E0, E1)",
             statistic <= bound,
             f"<= {bound:.4g}",
             statistic,
@@ -328,12 +362,14 @@ def reversal(evidence: ClaimEvidence) -> list[Check]:
 def _energies(
     evidence: ClaimEvidence, scene: Scene, n: int, low: float, high: float, stream: int
 ) -> FloatArray:
-    """Return E0 and E1, (2, n), of particles that start with all energies from low to high alike."""
+    """Return E0 and E1, (2, n), of particles whose start energies are uniform from low to high."""
     random = np.random.default_rng(run_seed(evidence.seed, RUNS["moving-cap@1e3"], stream))
     speeds = np.sqrt(2 * random.uniform(low, high, n)).tolist()
     states = [
         State(one.t, one.x, one.y, v * one.vx, v * one.vy)
-        for one, v in zip(profiles.microcanonical_states(scene, n, 0.5, random), speeds, strict=True)
+        for one, v in zip(
+            profiles.microcanonical_states(scene, n, 0.5, random), speeds, strict=True
+        )
     ]
     done = evidence.steppers.flow(scene, states, scene.period, evidence.threads)
     ends = [one.vx**2 + one.vy**2 if isinstance(one, Horizon) else np.nan for one in done.outcomes]

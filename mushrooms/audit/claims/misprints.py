@@ -1,8 +1,8 @@
-"""Single formulas of the paper: their misprints, M1 to M4, M10, M12 and M13; identities and checks, I and N.
+"""Single formulas of the paper: misprints M1 to M4, M10, M12, M13; identities I and N.
 
-A misprint's printed form must fail, and the corrected one hold, here and now: nothing is recorded. I claims
-hold for every cycle by theory and are held against simulations; N claims are checks of formulas against each
-other.
+A misprint's printed form must fail, and the corrected one hold, here and now: nothing is recorded.
+I claims hold for every cycle by theory and are held against simulations; N claims are checks of
+formulas against each other.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,12 +17,11 @@ import scene as scenes
 import theory
 from mushrooms.audit.claim import DIGITS, Check, ClaimEvidence, Form
 from mushrooms.audit.claims.finite_energy import Figure, captured_change, less_bias
-from mushrooms.audit.runs import scene_of
+from mushrooms.audit.runs import at_knots, scene_of
 from mushrooms.audit.tolerances import close, exact, half_unit, mean, stated
 from scene import State
 from scene.geometry import table_at
-from scene.laws import bounds, value
-from scene.tables import Mushroom, laws
+from scene.tables import Mushroom
 
 FORMS: tuple[Form, Form] = ("printed", "corrected")
 ZERO = 1e-12  # float64 sums of a few hundred terms of order 10
@@ -30,7 +29,9 @@ N_HITS = 500
 N_LOOP = 256  # the trapezoid rule converges geometrically on smooth periodic loops
 NAMES = ("fixed-cap-anticlockwise", "fixed-cap-clockwise", "moving-cap", "moving-cap-reversed")
 N_DRAWN_LOOPS = 6
-INVERSE = Figure("simulation", lambda s: mean(np.exp(-s.gain)), lambda f: f.mean_of_exp(-1), "mean_s")
+INVERSE = Figure(
+    "simulation", lambda s: mean(np.exp(-s.gain)), lambda f: f.mean_of_exp(-1), "mean_s"
+)
 SIMULATED = (
     "fixed-cap-anticlockwise@1e9",
     "fixed-cap-clockwise@1e9",
@@ -50,17 +51,26 @@ def half_angle(evidence: ClaimEvidence) -> list[Check]:
     """M1: the mouth as printed, sin²(t), and with the half angle."""
     try:
         scenes.load("moving-cap-as-printed")
-        message, is_valid = "valid", True
+        message = "valid"
+        is_valid = True
     except scenes.InvalidScene as error:
-        message, is_valid = str(error).partition(": ")[2], False
+        message = str(error).partition(": ")[2]
+        is_valid = False
     upright = Mushroom(  # valid, as its slope is 0: the loop can be solved
         r=scenes.Fourier(1.0, 1.0, (), (0.5,)),
         h=scenes.Fourier(1.0, 1.0, (), (-0.5,)),
         nu=scenes.Fourier(0.6, 1.0, (0.0, 0.4)),
     )
-    as_printed, corrected = evidence.predict(upright), evidence.predict("moving-cap")
+    as_printed = evidence.predict(upright)
+    corrected = evidence.predict("moving-cap")
     return [
-        stated("sin²(t): the table is valid through the cycle", is_valid, message, "valid", form="printed"),
+        stated(
+            "sin²(t): the table is valid through the cycle",
+            is_valid,
+            message,
+            "valid",
+            form="printed",
+        ),
         stated(
             "sin²(t), slope 0: energy grows",
             bool(as_printed.m1 > ZERO),
@@ -68,7 +78,13 @@ def half_angle(evidence: ClaimEvidence) -> list[Check]:
             "m1 > 0",
             form="printed",
         ),
-        stated("sin²(t/2): the table is valid", True, "valid, by exact algebra", "valid", form="corrected"),
+        stated(
+            "sin²(t/2): the table is valid",
+            True,
+            "valid, by exact algebra",
+            "valid",
+            form="corrected",
+        ),
         rounds("sin²(t/2): m1", "0.122768", corrected.m1, "corrected"),
         rounds("sin²(t/2): p_nc", "0.38474", corrected.p_nc, "corrected"),
     ]
@@ -98,7 +114,10 @@ def signs(evidence: ClaimEvidence) -> Iterator[Check]:
 
 
 def loop_area(name: str) -> float:
-    """Return the signed area of a loop in the plane (V_ell/V_cap, V_cap/V), anticlockwise positive."""
+    """Return the signed area of a loop in the plane (V_ell/V_cap, V_cap/V).
+
+    It is positive anticlockwise.
+    """
     return signed_area(*volume_loop(scenes.load(name), N_LOOP))
 
 
@@ -113,34 +132,48 @@ def _volumes(table: scenes.Scene, n: int) -> list[theory.Volumes]:
 
 
 def signed_area(x: Sequence[float], y: Sequence[float]) -> float:
-    """Return the area of a closed polygon, positive when it runs anticlockwise (the shoelace formula)."""
+    """Return the area of a closed polygon by the shoelace formula, positive if anticlockwise."""
     n = len(x)
     return float(sum(x[k] * y[(k + 1) % n] - x[(k + 1) % n] * y[k] for k in range(n)) / 2)
 
 
 def radius_squared(evidence: ClaimEvidence) -> Iterator[Check]:
-    """M3: the half disk x² + y² <= r has an area ~ r, that of r² has r²; E V_cap is kept by the captured."""
+    """M3: the half disk x² + y² <= r has an area ~ r, that of r² has r².
+
+    E V_cap is kept by the captured.
+    """
     sample = evidence.sample("moving-cap@1e7")
-    r = laws(scene_of(sample.run))["r"]
-    first, last = (fp.log(value(fp, r, 2 * fp.pi * phase)) for phase in (7 / 16, 9 / 16))
+    r = scene_of(sample.run).laws["r"]
+    first, last = (fp.log(r.value(fp, 2 * fp.pi * phase)) for phase in (7 / 16, 9 / 16))
     gain = captured_change(sample, 6, 8)
     # E is seen since the last hit, half a chord before on average, in which log r changes by u/v.
-    band = 2 * float(bounds(r).slope) / sample.speed / abs(last - first)
+    band = 2 * float(r.bounds().slope) / sample.speed / abs(last - first)
     for power, form in zip((1, 2), FORMS, strict=True):
-        what = f"x² + y² <= r{'²' if power == 2 else ''}: E goes as 1 / area of the cap, as r to the power"
+        bound = "r²" if power == 2 else "r"
+        what = f"x² + y² <= {bound}: E goes as 1 / area of the cap, as r to the power"
         found = mean(-gain / (last - first))
         yield close(
-            what, found, power, band=band, scale=0.5, form=form, against=(f"{3 - power}", 3.0 - power)
+            what,
+            found,
+            power,
+            band=band,
+            scale=0.5,
+            form=form,
+            against=(f"{3 - power}", 3.0 - power),
         )
 
 
 def exponent_sign(evidence: ClaimEvidence) -> Iterator[Check]:
     """M4: exp(-∫ dV_ell/V_cha) and exp(+∫ dV_ell/V_cha) over the mouth's closing, sec. 4.1."""
-    for name, paper in (("fixed-cap-anticlockwise", "0.843472"), ("fixed-cap-clockwise", "0.717894")):
+    for name, paper in (
+        ("fixed-cap-anticlockwise", "0.843472"),
+        ("fixed-cap-clockwise", "0.717894"),
+    ):
         w0, w1, h, _, slope = fixed_cap(name)
         with mpmath.workdps(DIGITS):
             integral = mpmath.quad(partial(capture_rate, h=h, slope=slope), [w0, w1])
-            minus, plus = mpmath.exp(-integral), mpmath.exp(integral)
+            minus = mpmath.exp(-integral)
+            plus = mpmath.exp(integral)
         theirs = evidence.predict(name).p_nc
         yield from [
             stated(
@@ -152,22 +185,28 @@ def exponent_sign(evidence: ClaimEvidence) -> Iterator[Check]:
             ),
             rounds(f"exp(-∫), {name}: p_nc", paper, minus, "printed"),
             rounds(f"exp(+∫), {name}: p_nc", paper, plus, "corrected"),
-            exact(f"exp(+∫), {name}: eq. (ps)", plus, theirs, 10.0 ** (5 - DIGITS), form="corrected"),
+            exact(
+                f"exp(+∫), {name}: eq. (ps)", plus, theirs, 10.0 ** (5 - DIGITS), form="corrected"
+            ),
         ]
 
 
 def fixed_cap(name: str) -> tuple[Any, Any, Any, Any, Any]:
-    """Return w0, w1, h while the mouth closes and while it opens, and slope, of a scene of sec. 4.1."""
-    given = laws(scenes.load(name))
-    knots, depths = (given[law].knots for law in ("w", "h"))  # type: ignore[union-attr]
-    closing = next(i for i in range(len(knots) - 1) if knots[i + 1][1] < knots[i][1])
-    opening = next(i for i in range(len(knots) - 1) if knots[i + 1][1] > knots[i][1])
-    w1, w0 = mpmath.mpf(knots[closing][1]), mpmath.mpf(knots[closing + 1][1])
-    return w0, w1, *(mpmath.mpf(x) for x in (depths[closing][1], depths[opening][1], given["slope"]))
+    """Return w0, w1, h while the mouth closes and while it opens, and slope (sec. 4.1)."""
+    laws = scenes.load(name).laws
+    widths = at_knots(laws["w"])
+    depths = at_knots(laws["h"])
+    closing = next(i for i in range(len(widths) - 1) if widths[i + 1] < widths[i])
+    opening = next(i for i in range(len(widths) - 1) if widths[i + 1] > widths[i])
+    w1 = mpmath.mpf(widths[closing])
+    w0 = mpmath.mpf(widths[closing + 1])
+    h_closing = mpmath.mpf(depths[closing])
+    h_opening = mpmath.mpf(depths[opening])
+    return w0, w1, h_closing, h_opening, mpmath.mpf(laws["slope"].level)
 
 
-# In the variable w, with r = 1 and h at rest, from the definitions of sec. 2. Theory integrates over time, so
-# the two share nothing.
+# In the variable w, with r = 1 and h at rest, from the definitions of sec. 2. Theory integrates
+# over time, so the two share nothing.
 
 
 def capture_rate(w: Any, h: Any, slope: Any) -> Any:
@@ -183,12 +222,20 @@ def chaotic_volume(w: Any, h: Any, slope: Any) -> Any:
 
 
 def cone(evidence: ClaimEvidence) -> Iterator[Check]:
-    """M10: which end the cone |x| <= w + y tan theta has, y = h as printed or y = -h: where it is met."""
+    """M10: which end the cone |x| <= w + y tan theta has.
+
+    It is y = h as printed, or y = -h. The walls that particles meet tell.
+    """
     table = scenes.load("frozen-mushroom")
     done = evidence.steppers.trajectory(table, State(0.0, 0.1, -0.2, 0.3, -1.0), N_HITS, fp.inf)
-    now, x, y = table_at(fp, table, 0.0), done.steps[:, 2], done.steps[:, 3]
-    at = {wall: np.array([met == wall for met in done.walls]) for wall in ("left", "right", "floor")}
-    sides, floor = at["left"] | at["right"], at["floor"]
+    now = table_at(fp, table, 0.0)
+    x = done.steps[:, 2]
+    y = done.steps[:, 3]
+    at = {
+        wall: np.array([met == wall for met in done.walls]) for wall in ("left", "right", "floor")
+    }
+    sides = at["left"] | at["right"]
+    floor = at["floor"]
     lowest = float(y.min())
     for end, form in zip((now.h, -now.h), FORMS, strict=True):
         label = "y = h" if end > 0 else "y = -h"
@@ -209,7 +256,11 @@ def cone(evidence: ClaimEvidence) -> Iterator[Check]:
         )
     off = np.abs(np.abs(x[sides]) - now.half_width(y[sides])).max()
     yield exact(
-        "its sides are met where |x| = w + y tan theta", float(off), 0, ZERO * now.w, form="corrected"
+        "its sides are met where |x| = w + y tan theta",
+        float(off),
+        0,
+        ZERO * now.w,
+        form="corrected",
     )
 
 
@@ -239,7 +290,8 @@ def loop_plane(evidence: ClaimEvidence) -> Iterator[Check]:
         ),
     ]
     for name in ("moving-cap", "fixed-cap-anticlockwise"):
-        turn, found = loop_area(name), evidence.predict(name)
+        turn = loop_area(name)
+        found = evidence.predict(name)
         yield stated(
             f"plane (V_ell/V_cap, V_cap/V): {name} has an area, and growth",
             abs(turn) > ZERO and found.m1 > 0,
@@ -251,13 +303,17 @@ def loop_plane(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def measures(evidence: ClaimEvidence) -> list[Check]:
     """M13: whose share p_cha is, and which volume the set H = E has."""
-    table = Mushroom(r=1.0, h=scenes.Fourier(1.0, 1.0, (), (0.5,)), nu=scenes.Fourier(0.5, 1.0, (0.4,)))
+    table = Mushroom(
+        r=1.0, h=scenes.Fourier(1.0, 1.0, (), (0.5,)), nu=scenes.Fourier(0.5, 1.0, (0.4,))
+    )
     start = theory.volumes_at(fp, table, 0.0)  # nu = 0.9 at most: an island remains
     p_nc = float(evidence.predict(table).p_nc)
     free = start.v_cha / (start.v_cap + start.v_stem)
-    energy, area = 2.0, 1.0
+    energy = 2.0
+    area = 1.0
     printed = 2 * fp.pi * fp.sqrt(2 * energy) * area
-    rate = 2 * fp.pi * ((energy + 1) - (energy - 1)) * area / 2  # of the volume below H = E: a disk times A
+    # Of the volume below H = E: a disk times A.
+    rate = 2 * fp.pi * ((energy + 1) - (energy - 1)) * area / 2
     return [
         exact(
             "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)",
@@ -333,7 +389,10 @@ def formulas_in_w(evidence: ClaimEvidence) -> Iterator[Check]:
 
 
 def _over_w(w0: Any, w1: Any, h_in: Any, h_out: Any, slope: Any) -> tuple[Any, Any]:
-    """Return the integral of (g - 1 - log g) dp_cha(w), p_cha rising with w, and that of eq. (Enoncapt)."""
+    """Return the integral of (g - 1 - log g) dp_cha(w), and that of eq. (Enoncapt).
+
+    p_cha rises with w.
+    """
     rate, rate_out = (partial(capture_rate, h=h, slope=slope) for h in (h_in, h_out))
 
     def growth(w: Any) -> Any:
@@ -348,7 +407,8 @@ def _over_w(w0: Any, w1: Any, h_in: Any, h_out: Any, slope: Any) -> tuple[Any, A
 def positivity(evidence: ClaimEvidence) -> Iterator[Check]:
     """N3: m1 >= 0 for any cycle, several captures included."""
     random = np.random.default_rng(evidence.seed)
-    least, n_nested = np.inf, 0
+    least = np.inf
+    n_nested = 0
     for k in range(N_DRAWN_LOOPS):
         a, b = random.uniform(-0.3, 0.3, 2)
         second = 0.12 * (k % 2)  # a second harmonic gives nu two wells
@@ -410,10 +470,12 @@ def right_mode(_evidence: ClaimEvidence) -> list[Check]:
 def orientations(_evidence: ClaimEvidence) -> Iterator[Check]:
     """N6: the sense of sec. 4.1's loops in the plane (w, h), as eq. (cycle) and its reverse say."""
     for name, sign in (("fixed-cap-anticlockwise", 1), ("fixed-cap-clockwise", -1)):
-        moving = laws(scenes.load(name))
-        w, h = ([v for _, v in moving[of].knots[:-1]] for of in ("w", "h"))  # type: ignore[union-attr]
+        moving = scenes.load(name).laws
+        w, h = (at_knots(moving[of])[:-1] for of in ("w", "h"))
         area = signed_area(w, h)
-        yield stated(f"{name} in the plane (w, h)", area * sign > 0, f"area {area:+.3f}", f"sign {sign:+d}")
+        yield stated(
+            f"{name} in the plane (w, h)", area * sign > 0, f"area {area:+.3f}", f"sign {sign:+d}"
+        )
     yield stated(
         "moving-cap in the plane (V_ell/V_cap, V_cap/V): clockwise",
         loop_area("moving-cap") < 0,

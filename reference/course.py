@@ -180,25 +180,29 @@ class Course:
         search is no answer yet: a wall searched before may be met beyond this end, within the interval.
         """
         hits: list[Hit] = []
-        postponed: list[Wall]
         for stop in self._stops(start, self.horizon if limit is None else limit):
-            until = stop
-            hits = []
-            postponed = []
-            for wall in itertools.chain(walls, postponed):
-                try:
-                    hit = self._hit(wall, start, until, self._searches)
-                except Undecidable as question:
-                    # An undecided wall may be met after another one. Each wall is postponed once.
-                    if isinstance(question, Exhausted) or wall in postponed:
-                        raise
-                    postponed.append(wall)
-                    continue
-                if hit is not None and not self._is_at_horizon(hit):
-                    hits.append(hit)
-                    until = hit.time
-            if hits and is_below(until, stop):
+            hits = self._hits_until(walls, start, stop)
+            if hits and is_below(hits[-1].time, stop):
                 break
+        return hits
+
+    def _hits_until(self, walls: tuple[Wall, ...], start: Interval, stop: Interval) -> list[Hit]:
+        """Find, as `_hits` does, the walls that may be met first before the end of one search."""
+        until = stop
+        hits: list[Hit] = []
+        postponed: list[Wall] = []
+        for wall in itertools.chain(walls, postponed):
+            try:
+                hit = self._hit(wall, start, until, self._searches)
+            except Undecidable as question:
+                # An undecided wall may be met after another one. Each wall is postponed once.
+                if isinstance(question, Exhausted) or wall in postponed:
+                    raise
+                postponed.append(wall)
+                continue
+            if hit is not None and not self._is_at_horizon(hit):
+                hits.append(hit)
+                until = hit.time
         return hits
 
     def _stops(self, start: Interval, until: Interval) -> Iterator[Interval]:

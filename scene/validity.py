@@ -105,16 +105,13 @@ def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
 def _is_clear(condition: Condition) -> bool:
     """Tell whether the ranges of the laws prove a condition. For most scenes they do, at little cost."""
     # Of two floats the sum has the right sign; products are taken exactly.
-    level = float if all(len(factors) == 1 for _, factors in condition.terms) else Fraction
+    level: Any = float if all(len(factors) == 1 for _, factors in condition.terms) else Fraction
     least = level(0)
     for sign, factors in condition.terms:
-        ends = [level(sign)]
-        for law in factors:
-            lowest, highest, *_ = law.bounds()
-            if not (isfinite(lowest) and isfinite(highest)):
-                return False
-            ends = [end * level(bound) for end in ends for bound in (lowest, highest)]
-        least += min(ends)
+        ranges = [law.bounds()[:2] for law in factors]
+        if not all(map(isfinite, itertools.chain(*ranges))):
+            return False
+        least += min(level(sign) * prod(map(level, ends)) for ends in itertools.product(*ranges))
     return least > 0 or (least == 0 and not condition.is_strict)
 
 
@@ -124,18 +121,23 @@ def _check(laws: Laws, condition: Condition) -> None:
     used = [law for _, factors in condition.terms for law in factors if not law.is_constant]
     legs = [law for law in used if law.breakpoints()]
     if not (all(law.is_polynomial for law in used) or all(law.is_trigonometric for law in used)):
-        verdict = sign_on_legs(condition.terms, condition.is_strict, leg_intervals(legs))
-        if verdict.holds is None:
-            raise InvalidScene(
-                f"{condition.text} cannot be shown near t = {float(verdict.time):.6g}: where Fourier and"
-                " bang-bang laws meet in one condition its sides must keep apart: here they touch, or nearly"
-            )
-        if not verdict.holds:
-            raise InvalidScene(_message(laws, condition, verdict.time))
+        _check_mixed(laws, condition, legs)
         return
     for p, a, b in _on_legs(condition, legs) if legs else _on_circle(condition):
         if exact.negative_point(p, a, b) is not None or (condition.is_strict and exact.vanishes(p, a, b)):
             raise InvalidScene(_message(laws, condition))
+
+
+def _check_mixed(laws: Laws, condition: Condition, legs: Sequence[Law]) -> None:
+    """Refuse a condition in which laws of both kinds move, unless intervals prove it."""
+    verdict = sign_on_legs(condition.terms, condition.is_strict, leg_intervals(legs))
+    if verdict.holds is None:
+        raise InvalidScene(
+            f"{condition.text} cannot be shown near t = {float(verdict.time):.6g}: where Fourier and"
+            " bang-bang laws meet in one condition its sides must keep apart: here they touch, or nearly"
+        )
+    if not verdict.holds:
+        raise InvalidScene(_message(laws, condition, verdict.time))
 
 
 class SignVerdict(NamedTuple):

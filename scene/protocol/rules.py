@@ -312,13 +312,18 @@ def without_loose(data: Any) -> tuple[Any, bool]:
     for name, law in kept.items():
         known = _fields_of(law, "kind", KINDS)
         if known:
-            kept[name] = {
-                field: part
-                for field, part in law.items()
-                if field in known and (part is not None or field not in OPTIONAL)
-            }
+            kept[name] = _kept_fields(law, known)
             is_loose |= len(kept[name]) < len(law)
     return kept, is_loose
+
+
+def _kept_fields(law: Mapping[str, Any], known: tuple[str, ...]) -> dict[str, Any]:
+    """Return the fields of a law that count: those that are known, without optional ones that are null."""
+    return {
+        field: part
+        for field, part in law.items()
+        if field in known and (part is not None or field not in OPTIONAL)
+    }
 
 
 def _fields_of(data: Any, tag: str, forms: Mapping[str, type[msgspec.Struct]]) -> tuple[str, ...]:

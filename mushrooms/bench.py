@@ -46,7 +46,9 @@ from scene import BadInput, Collision, Scene, State
 from scene.files.writer import write_files
 from scene.refusal import refuse_unheeded
 
-TIMEOUT, RESTARTS = 30.0, 1  # of a command
+# Of a command.
+TIMEOUT = 30.0
+RESTARTS = 1
 # By size: questions of a workload, steps with walls only, runs, trajectories and their length.
 QUESTIONS = {"quick": 12, "full": 64}
 FURTHER = {"quick": 200, "full": 2000}
@@ -83,7 +85,10 @@ class BenchOptions:
 
 
 def measure_solvers(options: BenchOptions) -> None:
-    """Measure speed against error, into a folder; or print a table of an earlier benchmark."""
+    """Measure speed against error and write it into a folder.
+
+    Or print a table of an earlier benchmark.
+    """
     if options.table is not None:
         measuring = {"--quick": options.quick or None, "COMMAND": options.command or None}
         refuse_unheeded(measuring, "--table measures nothing")
@@ -131,6 +136,7 @@ def _measure(size: Size, seed: int, command: Sequence[str]) -> Record:
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
+            fast.warm(workload.scene)  # what is measured is compiled code
             found, failures = solvers.measure(workload, running, effort, tick)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in failures.items()}
@@ -194,7 +200,10 @@ def _solvers(
 def prove_path(
     scene: Scene, state: State, n_collisions: int
 ) -> tuple[list[PathPoint], list[Sensitivity]]:
-    """Follow a path by proof, right to twenty digits at its end, and chain its Jacobians."""
+    """Follow a path by proof and chain the Jacobians of its steps.
+
+    Twenty digits are right at its end.
+    """
     path = reference.trajectory(scene, state, n_collisions, digits=20, is_differentiated=True)
     links = Links(state)
     chain = [Sensitivity(links.add(step), links.held[0]) for step in path.steps]
@@ -214,7 +223,10 @@ def our_solvers() -> list[Solver]:
 
 
 def our_followers() -> dict[str, PathFollower]:
-    """Return followers of trajectories: binary64, compensated time, proofs of fixed precision."""
+    """Return followers of trajectories.
+
+    They use binary64, compensated time, or proofs of fixed precision.
+    """
     return {
         "binary64 (plain Python)": _plain_path,
         "compensated (fast)": _fast_path,
@@ -251,7 +263,10 @@ def _fine(workload: Workload, n_times: int) -> SolverRun:
 
 
 def _lanes(workload: Workload, n_times: int) -> SolverRun:
-    """Time the engine on flights from the questions; grade one round of its lanes on these."""
+    """Time the engine on flights that go on from the questions.
+
+    Grade one round of its lanes on these.
+    """
     states = [q.state for q in workload.questions]
     copies = -(-128 // len(states))  # enough to fill both pools
     followed = states[:1] if workload.rule.length else states * copies
@@ -268,7 +283,10 @@ def _lanes(workload: Workload, n_times: int) -> SolverRun:
 
 
 def _trajectory(workload: Workload, n_times: int) -> SolverRun:
-    """Time a path from the first question, call and arrays included; grade a step from each."""
+    """Time a path from the first question, the call and its arrays included.
+
+    Grade a step from each.
+    """
     states = [q.state for q in workload.questions]
     paths = [fast.trajectory(workload.scene, state, 1) for state in states]
     begin = time.perf_counter_ns()

@@ -1,4 +1,4 @@
-"""`mushrooms check`: the conformance suite on a command; its progress, summary and reports."""
+"""`mushrooms check`: the conformance suite on a command, its progress, summary and report files."""
 
 import secrets
 import shlex
@@ -210,7 +210,10 @@ def _show_measured(console: Console, run: Run) -> None:
 
 
 def _show_objections(console: Console, run: Run) -> None:
-    """Print why the run does not succeed: what was given, what is certified, what fails alike."""
+    """Print why the run does not succeed.
+
+    What was given stands beside what is certified; what fails alike is named.
+    """
     objections = run.objections()
     for line in objections[:MAX_SHOWN]:
         console.print(f"[red]{escape(line)}[/]")
@@ -236,7 +239,7 @@ def _show_objections(console: Console, run: Run) -> None:
 
 
 def _show_stderr(console: Console, run: Run) -> None:
-    """Print how the standard error of a stepper ends that crashed or broke the protocol."""
+    """Print how the standard error ends if a process crashed or broke the protocol."""
     wrong = [result for result in run.results if not result.is_right]
     is_broken = any(result.verdict == "crashed" or result.group == "protocol" for result in wrong)
     lines = run.stderr.split("\n")

@@ -121,6 +121,26 @@ def scenes(
     print_scenes(options)
 
 
+@app.command(epilog="Example: mushrooms warm moving-cap")
+def warm(
+    scene: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENE", help="Only kernels for this scene: a name, or a .toml or .json file."
+        ),
+    ] = "",
+) -> None:
+    """Compile the fast stepper ahead, so that no later command waits for it.
+
+    The code is kept for this user and machine: in the folder NUMBA_CACHE_DIR if that is set, else
+    beside the package. Without SCENE all kernels are compiled, which takes minutes.
+    """
+    from mushrooms.warm import WarmOptions, warm_kernels
+
+    options = WarmOptions(scene=scene)
+    warm_kernels(options)
+
+
 @app.command(epilog="Example: mushrooms theory moving-cap --digits 40")
 def theory(
     scene: SceneName,

@@ -1,4 +1,7 @@
-"""`mushrooms draw`: a table through its cycle, particles in it, and the export of a trajectory."""
+"""`mushrooms draw`: a table through its cycle, and what particles do in it.
+
+The export of a trajectory.
+"""
 
 from dataclasses import dataclass
 from functools import partial
@@ -18,14 +21,12 @@ from mushrooms.store.run import is_run, open_run
 from scene import BadInput, Scene, Stem
 from scene.files.tables import SUFFIXES
 from scene.files.writer import write_file
-from scene.laws import bounds
 from scene.named import is_scene, scene_named
 from scene.refusal import refuse_unheeded
-from scene.tables import laws
 
 
 class Usual(NamedTuple):
-    """What a picture takes when nothing is asked: particles, crossings a cycle, the end."""
+    """What a picture takes if nothing is asked: particles, crossings in a cycle, the end."""
 
     n_orbits: int
     crossings: float
@@ -120,7 +121,10 @@ def usual_of(kind: str, scene: Scene, phase: float | None) -> Usual:
 
 
 def draw_scene(options: DrawOptions) -> None:
-    """Draw pictures of a scene or a stored run, export a trajectory; print the files' names."""
+    """Draw pictures of a scene, or of a stored run, and export a trajectory.
+
+    Print the names of the files.
+    """
     name = options.scene
     out = options.out
     export = options.export
@@ -175,7 +179,7 @@ def _paths(scene: Scene, out: Path, kinds: list[str]) -> dict[str, Path]:
         BadInput: one of them cannot be drawn, or not written, or does not move and is to be a .gif.
     """
     found = {
-        f"scene.{name}": bounds(law).highest for name, law in laws(scene).items() if name != "slope"
+        f"scene.{name}": law.bounds().highest for name, law in scene.laws.items() if name != "slope"
     }
     found |= {"period": scene.period} if scene.period else {}
     for name, size in found.items():  # squares and sums of them are in a figure

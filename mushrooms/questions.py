@@ -1,4 +1,4 @@
-"""`mushrooms ask`, `attack` and `verify`: single questions, their proof, and steppers' answers.
+"""`mushrooms ask`, `attack` and `verify`: single questions, proved answers, answers of steppers.
 
 A question is a case of the test suite, a draw of a family of nasty questions, or a step of a
 trajectory.
@@ -57,7 +57,10 @@ class AskOptions:
 
 
 def ask_case(options: AskOptions) -> int:
-    """Print a question, its answer and its rule; ask a stepper too; return the exit code."""
+    """Print a question with its answer and rule.
+
+    Ask a stepper too, if one is given; return the exit code.
+    """
     vector = _find(options.case, options.seed)
     transform = Transform() if options.seed is None else draw_transform(vector, options.seed)
     result = _put(options.command, vector, transform) if options.command else None
@@ -98,9 +101,8 @@ def _show(vector: vectors.Vector, transform: Transform) -> None:
         )
     console.print(f"question   {escape(json.dumps(vectors.request(transform.apply(vector), 0)))}")
     for i, expectation in enumerate(vector.expect):
-        console.print(
-            f"{'or' if i else 'certified'}  {expectation.outcome} {expectation.reason}".rstrip()
-        )
+        head = "certified" if i == 0 else "or"
+        console.print(f"{head}  {expectation.outcome} {expectation.reason}".rstrip())
         for number, outcome in enumerate(middle(expectation, vector.state), 1):
             console.print(f"  {number:>4}  {escape(format_outcome(msgspec.to_builtins(outcome)))}")
         for begin, end in expectation.stays:
@@ -168,7 +170,10 @@ def attack_steppers(options: AttackOptions) -> int:
 
 
 def count_hits(scene: Scene, state: State, t_end: float) -> dict[str, int] | None:
-    """Return how often the lanes meet each wall up to t_end; None if a flow gives no answer."""
+    """Return how often the lanes meet each wall up to t_end.
+
+    None where a flow is undecided or refused.
+    """
     try:
         carried = fast.flow(scene, [state], t_end)
     except BadInput:
@@ -275,7 +280,10 @@ def verify_file(options: VerifyOptions) -> int:
 def _judge(
     answers: verifier.Answers, report: verifier.Report, is_all: bool
 ) -> tuple[str, dict[str, Any], dict[str, Any]] | None:
-    """Judge steps, print those that do not agree; return the first false: place, start, answer."""
+    """Judge steps and print those that do not agree.
+
+    The first false one is returned: place, start, answer.
+    """
     seen = [answers.state]
 
     def remembered() -> Iterator[tuple[str, Any]]:

@@ -1,4 +1,4 @@
-"""`mushrooms scenes` and `theory`: the catalogue, a scene as a file, predictions for a cycle."""
+"""`mushrooms scenes` and `theory`: the catalogue, a scene as a file, theory for one cycle."""
 
 import json
 import math
@@ -152,7 +152,10 @@ def print_prediction(options: TheoryOptions) -> None:
 
 
 def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
-    """Return the figures of one cycle at an initial energy; if there are none, print why."""
+    """Return the figures of one cycle at an initial energy.
+
+    Where there are none, say why on stderr.
+    """
     speed = math.sqrt(2 * energy)
     n_collisions = expected_collisions(scene, energy, 1)
     first: dict[str, float | bool | None] = {

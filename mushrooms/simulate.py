@@ -235,7 +235,7 @@ def tell(note: str | None) -> None:
 
 
 def draw_energies(path: Path, spec: RunSpec, gains: Iterator[Any], n_particles: int) -> None:
-    """Write the histogram of ln(E1/E0); of several cycles the mean after each.
+    """Write the histogram of ln(E1/E0) of those that take part, and means by cycle if several.
 
     Raises:
         BadInput: they are too few.

@@ -2,7 +2,8 @@
 
 `path` answers one step and many, and reflects the particle; `answers` describes the results. `start` judges
 the starting state, and `course` follows a flight. `isolation` finds the first root on each wall of `walls`,
-in the arithmetic of `arithmetic`, or for ties of `rational`.
+in the arithmetic of `arithmetic`, or for ties of `rational`. `timeline` has the laws in time. `arithmetic`
+also limits the work of a step.
 """
 
 from reference.answers import (

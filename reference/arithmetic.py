@@ -69,7 +69,8 @@ class Enclosure(NamedTuple):
 
     def __repr__(self) -> str:
         """Return the centre with its known decimals, and the greatest distance of the true number from it."""
-        centre, half = self.centre(), self.extent() / 2
+        centre = self.centre()
+        half = self.extent() / 2
         if not half and Fraction(float(self)) == centre:
             return f"Enclosure({float(self)!r})"
         half = half or abs(centre) * Fraction("1E-40")

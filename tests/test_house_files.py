@@ -25,12 +25,12 @@ LONGER = {"conformance/verify.py": "one file that anyone can read and run, witho
 # last raise, so that a mend never waits for a bound. A bound rises in the commit that adds a capability, and
 # that commit says why. Tests have none: a regression test never has to buy its place.
 MAX_STATEMENTS = {
-    "scene": 1_900,
-    "reference": 1_346,
-    "fast": 3_580,
+    "scene": 1_980,
+    "reference": 1_450,
+    "fast": 3_728,
     "theory": 2_147,
     "conformance": 8_079,
-    "mushrooms": 5_850,
+    "mushrooms": 6_012,
     "docs": 242,
     ".ci": 65,
     "tests": math.inf,

@@ -120,9 +120,9 @@ def _check_report(folder: Path, wanted: set[str]) -> None:
         return
     if there - wanted:
         raise BadInput(
-            f"output {str(folder)!r} has a report of {len(there)} claims,"
-            f" size = {report.get('size')!r} and seed = {report.get('seed')};"
-            f" {len(wanted)} are asked for: with --resume none is given up"
+            f"output {str(folder)!r} has a report of {len(there)} claims, size ="
+            f" {report.get('size')!r} and seed = {report.get('seed')}; {len(wanted)} are asked for:"
+            " with --resume none is given up"
         )
 
 
@@ -135,7 +135,7 @@ def spec_of(run: Simulation, seed: int) -> RunSpec:
 
 
 def command(run: Simulation, size: Size, seed: int, folder: Path) -> str:
-    """Return the command that makes a run where an audit in the folder finds it with --resume."""
+    """Return the command that makes a run where an audit with --resume takes it up."""
     return spec_of(run, seed).command(run.scene, run.n_particles(size), folder / FOLDER / run.name)
 
 

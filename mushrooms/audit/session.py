@@ -32,7 +32,14 @@ from scene.refusal import check_seed
 
 # Modules of this folder that decide nothing: import-linter holds that none that decides imports
 # them.
-SHOWING = ("command.py", "ensemble_command.py", "figures.py", "options.py", "page.py")
+SHOWING = (
+    "command.py",
+    "ensemble_command.py",
+    "ensemble_table.py",
+    "figures.py",
+    "options.py",
+    "page.py",
+)
 
 
 class AuditSettings(NamedTuple):
@@ -110,7 +117,7 @@ def conduct(
     begin = time.perf_counter()
     if settings.folder:
         settings.folder.mkdir(parents=True, exist_ok=True)
-        # Before anything is examined: an edit meanwhile is not what runs, nor told as it.
+        # Before anything is examined: what is edited meanwhile does not run.
         code()
     known = {claim.id: _kept(claim, settings) for claim in claims}
     found = {
@@ -151,7 +158,10 @@ def needed(claims: Sequence[Claim], size: Size) -> list[Simulation]:
 
 
 def kept(settings: AuditSettings) -> set[str]:
-    """Return the ids of the claims whose findings are there, made by the same sources."""
+    """Return the ids of the claims whose findings are there.
+
+    What other sources found is found again.
+    """
     return {claim.id for claim in all_claims() if _kept(claim, settings)}
 
 
@@ -168,7 +178,10 @@ def examine(claim: Claim, evidence: ClaimEvidence) -> Finding:
 
 
 def _kept(claim: Claim, settings: AuditSettings) -> dict[str, Any]:
-    """Return the stored finding of a claim for these settings; empty without one."""
+    """Return the stored finding of a claim for these settings, from any earlier audit.
+
+    Empty without one.
+    """
     content = (
         unsealed(settings.folder / f"{claim.id}.finding")
         if settings.folder and settings.resume
@@ -180,7 +193,7 @@ def _kept(claim: Claim, settings: AuditSettings) -> dict[str, Any]:
 
 @cache
 def code() -> str:
-    """Return the SHA-256 of the sources that findings follow from, measured rates among them.
+    """Return the SHA-256 of the sources, measured rates among them, that make the findings.
 
     How findings are shown, and how a caller keeps particles, is no part of it: what is kept is
     looked at when it is taken up.

@@ -541,11 +541,6 @@ def is_constant(law: float | Law) -> bool:
     return law_of(law).is_constant
 
 
-def period_of(law: float | Law) -> Period | None:
-    """Return the period of a law that moves; None when it never changes."""
-    return law_of(law).cycle
-
-
 def shared_period(laws: Iterable[float | Law]) -> Period | None:
     """Return the period of the first law that moves."""
     return shared_cycle(map(law_of, laws))
@@ -559,11 +554,6 @@ def piece_at(law: float | Law, time: Fraction) -> Piece:
 def breakpoints(law: float | Law) -> list[Fraction]:
     """Return the times in one period, ends included, at which the law is not analytic."""
     return law_of(law).breakpoints()
-
-
-def evaluate(ctx: Any, piece: Piece, t: Any, order: int = 0) -> Any:
-    """Evaluate a piece, or its first or second derivative."""
-    return piece.evaluate(ctx, t, order)
 
 
 def value(ctx: Any, law: float | Law, t: Any, order: int = 0) -> Any:

@@ -25,7 +25,7 @@ LONGER = {"conformance/verify.py": "one file that anyone can read and run, witho
 # last raise, so that a mend never waits for a bound. A bound rises in the commit that adds a capability, and
 # that commit says why. Tests have none: a regression test never has to buy its place.
 MAX_STATEMENTS = {
-    "scene": 1_900,
+    "scene": 1_960,
     "reference": 1_450,
     "fast": 3_580,
     "theory": 2_147,

@@ -202,7 +202,7 @@ CTX.dps = 40
 
 def as_rows(scene):
     """Return a scene's laws by the row of their coefficients."""
-    found = {} if isinstance(scene, Stem) else {0: scene.r}
+    found = {} if isinstance(scene, Stem) else {0: scene.laws["r"]}
     if not isinstance(scene, Cap):
         found |= {1: scene.width.factors[0], 2: scene.laws["h"], 3: scene.laws["slope"]}
     return found

@@ -399,8 +399,8 @@ def mouth(scene, phases):
     start = next((law.knots[0][0] for law in (scene.r, scene.w, scene.nu) if isinstance(law, BangBang)), 0.0)
     shared = scene.cycle
     times = start + (float(shared.value(fp)) if shared else 1.0) * phases
-    nu, r = module.mouth_factors(scene)
-    return nu.values(times) / r.values(times)
+    laws = scene.laws
+    return laws["nu"].values(times) if "nu" in laws else laws["w"].values(times) / laws["r"].values(times)
 
 
 def fault(scene, found, n_samples=N_PHASES):

@@ -99,8 +99,7 @@ class Enclosure(NamedTuple):
 
 def rational(number: raw.Raw) -> Fraction:
     """Return the rational that a raw finite number stands for."""
-    numerator, denominator = raw.to_rational(number)
-    return Fraction(int(numerator), int(denominator))
+    return Fraction(*map(int, raw.to_rational(number)))
 
 
 def exact_number(number: raw.Raw) -> ExactMpf:
@@ -243,13 +242,11 @@ class Arithmetic:
 
     def _pi(self, bits: int) -> Interval:
         with CONSTANTS:
-            low, high = raw.pi(bits, raw.DOWN), raw.pi(bits, raw.UP)
-        return self.context.make_mpf((low, high))
+            return self.context.make_mpf((raw.pi(bits, raw.DOWN), raw.pi(bits, raw.UP)))
 
     def enclosure(self, x: Interval) -> Enclosure:
         """Return the ends as exact numbers, free of this context."""
-        lo, hi = raw.ends(x)
-        return Enclosure(exact_number(lo), exact_number(hi))
+        return Enclosure(*map(exact_number, raw.ends(x)))
 
 
 def sign(x: Interval) -> int:

@@ -1,10 +1,10 @@
 """One flight from a state to its first collision, at one working precision.
 
-At y = 0 the straight flight passes from one part of the table to the other. On each part the walls that
-bound it are searched from the left (`reference.isolation`). All quantities are enclosures, except the
-instant from which flight times are counted, so a trajectory can chain flights. `Undecidable` is raised if
-the precision does not decide. Only `reference.rational` proves equalities. docs/proof.md says what each
-answer claims, and why.
+At y = 0 the straight flight passes from one part of the table to the other. On each part the walls
+that bound it are searched from the left (`reference.isolation`). All quantities are enclosures,
+except the instant from which flight times are counted, so a trajectory can chain flights.
+`Undecidable` is raised if the precision does not decide. Only `reference.rational` proves
+equalities. docs/proof.md says what each answer claims, and why.
 """
 
 import itertools
@@ -77,7 +77,7 @@ class Course:
         return found if found is not None or limit is None else self._beyond_crossing(limit)
 
     def hit_after(self, wall: Wall, start: Interval) -> Interval | None:
-        """Find when the straight flight would meet a wall after `start`, were nothing in its way."""
+        """Find when the flight would meet a wall after `start`, were nothing in its way."""
         if wall == "base":
             crossing = self._crossing()
             return crossing if crossing is not None and is_below(start, crossing) else None
@@ -128,16 +128,22 @@ class Course:
         x = self.flight.x + self.flight.vx * crossing
         w = self.motion.width(crossing).f
         gaps: tuple[tuple[Wall, Interval], ...] = (("left", w + x), ("right", w - x))
-        signs = [sign(gap - self.leaving[side] if side in self.leaving else gap) for side, gap in gaps]
+        signs = [
+            sign(gap - self.leaving[side] if side in self.leaving else gap) for side, gap in gaps
+        ]
         if self.in_cap and -1 in signs:
             return self._base_hit(crossing)
         if signs != [1, 1]:
             return self._at_the_edge()
         if self.table.is_stem:
             return self._base_hit(crossing)
-        found = self._first_hit(SIDES if self.in_cap else ("arc",), self.arithmetic.lower(crossing), None)
+        found = self._first_hit(
+            SIDES if self.in_cap else ("arc",), self.arithmetic.lower(crossing), None
+        )
         if isinstance(found, Hit) and not is_below(crossing, found.time):
-            raise Undecidable("a wall is met at the height of the mouth, as far as this precision shows")
+            raise Undecidable(
+                "a wall is met at the height of the mouth, as far as this precision shows"
+            )
         return found
 
     def _at_the_edge(self) -> Undefined:
@@ -159,7 +165,7 @@ class Course:
     def _first_hit(
         self, walls: tuple[Wall, ...], start: Interval, limit: Interval | None
     ) -> Hit | Undefined | None:
-        """Find which of some walls is met first, before y = 0 is crossed (`limit`) or the horizon."""
+        """Find which of some walls is met first, before y = 0 (`limit`) or the horizon."""
         hits = self._hits(walls, start, limit)
         if not hits:
             farthest = self._escape_time()
@@ -174,20 +180,23 @@ class Course:
         return self._tied(hits, limit)
 
     def _hits(self, walls: tuple[Wall, ...], start: Interval, limit: Interval | None) -> list[Hit]:
-        """Find the walls that may be met first; each later one in the list not after those before it.
+        """Find the walls that may be met first.
 
-        A wall met exactly at the horizon is not met before it. A root whose interval contains the end of a
-        search is no answer yet: a wall searched before may be met beyond this end, within the interval.
+        No hit in the list is after one that stands before it.
+
+        A wall met exactly at the horizon is not met before it. A root whose interval contains the
+        end of a search is no answer yet: a wall searched before may be met beyond this end, within
+        the interval.
         """
         hits: list[Hit] = []
         for stop in self._stops(start, self.horizon if limit is None else limit):
-            hits = self._hits_until(walls, start, stop)
+            hits = self._hits_before(stop, walls, start)
             if hits and is_below(hits[-1].time, stop):
                 break
         return hits
 
-    def _hits_until(self, walls: tuple[Wall, ...], start: Interval, stop: Interval) -> list[Hit]:
-        """Find, as `_hits` does, the walls that may be met first before the end of one search."""
+    def _hits_before(self, stop: Interval, walls: tuple[Wall, ...], start: Interval) -> list[Hit]:
+        """Find the walls that may be met first before one end of a search."""
         until = stop
         hits: list[Hit] = []
         postponed: list[Wall] = []
@@ -206,7 +215,10 @@ class Course:
         return hits
 
     def _stops(self, start: Interval, until: Interval) -> Iterator[Interval]:
-        """Yield later and later ends of a search, first after one period: an early hit stays cheap."""
+        """Yield later and later ends of a search, first after one period.
+
+        An early hit stays cheap.
+        """
         upper = self.arithmetic.upper
         farthest = self._escape_time()
         last = upper(until)
@@ -243,12 +255,16 @@ class Course:
         raise Undecidable("two walls are met together, as far as this precision shows")
 
     def _rational_times(self, state: State) -> list[Fraction]:
-        """List the flight times, before the horizon, at which straight walls that stand still are met."""
+        """List the flight times at which straight walls at rest are met before the horizon."""
         times = [rational.crossing_time(state)]
         times += [rational.straight_time(self.table, state, wall) for wall in SIDES]
-        return [time for time in times if time is not None and (self.end is None or time < self.end)]
+        return [
+            time for time in times if time is not None and (self.end is None or time < self.end)
+        ]
 
-    def _met_at(self, instant: Fraction, hits: list[Hit], limit: Interval | None) -> tuple[Wall, ...]:
+    def _met_at(
+        self, instant: Fraction, hits: list[Hit], limit: Interval | None
+    ) -> tuple[Wall, ...]:
         """List the walls met exactly then, when all others are met later; else nothing."""
         assert self.exact is not None
         met: list[Wall] = []
@@ -259,7 +275,9 @@ class Course:
             met += ["base"] if crossing == instant else []
         for hit in hits:
             low, high = exact_ends(hit.time)
-            is_met = low <= instant <= high and rational.is_zero(self.table, self.exact, hit.wall, instant)
+            is_met = low <= instant <= high and rational.is_zero(
+                self.table, self.exact, hit.wall, instant
+            )
             if is_met:
                 met.append(hit.wall)
             elif low <= instant:
@@ -271,7 +289,8 @@ class Course:
     ) -> Hit | None:
         """Find the first root of one wall's function, if it may come before the end of `until`.
 
-        A search continues where it stopped, because f > 0 is proved there, unless it has found its root.
+        A search continues where it stopped, because f > 0 is proved there, unless it has found its
+        root.
         """
         stop = self.arithmetic.upper(until)
         if wall not in searches:
@@ -290,11 +309,16 @@ class Course:
         return Hit(wall, root.time, root.slope)
 
     def _end_beyond(self, search: Isolator, stop: Interval, length: Interval) -> Interval:
-        """Return where a search ends: a little later than asked for, so that a root at the end lies inside.
+        """Return where a search ends.
+
+        A little later than asked for, so that a root at the end lies inside.
 
         f must have a sign there, because a root may lie at that later end too.
         """
-        ends = [self.arithmetic.upper(stop + length * share) for share in (BEYOND, 2 * BEYOND, 3 * BEYOND)]
+        ends = [
+            self.arithmetic.upper(stop + length * share)
+            for share in (BEYOND, 2 * BEYOND, 3 * BEYOND)
+        ]
         return next((end for end in ends if sign(search.value(end)) != 0), ends[0])
 
     def _isolator(self, wall: Wall) -> Isolator:
@@ -320,7 +344,9 @@ class Course:
             start = self.arithmetic.zero
             jet = partial(motion.wall, wall)
             before = arithmetic.number(-1)
-            search = Isolator(arithmetic, jet, before, self.leaving.get(wall), timeline=self.motion.timeline)
+            search = Isolator(
+                arithmetic, jet, before, self.leaving.get(wall), timeline=self.motion.timeline
+            )
             try:
                 is_clear = sign(search.value(start)) > 0 and search.first_fall(start, turn) is None
             except Exhausted:

@@ -3,12 +3,13 @@
 With event point q = (x + vx s, y + vy s, t + s) and D = f'(s), the root's condition gives
 ds = -(f_q . dq at fixed s) / D, and the bounce v' = v - 2 D N / |N|^2 with N = (f_x, f_y) is
 differentiated through the second partials of f. Where the wall being left is met again, the
-equation is f(s) = f(0), and f(0) moves with the state too. Along a path that stays so: the residual of a
-wall met again and again is that of the first start, but each flight begins where f is just this, so that
-f at its own begin moves as much, whatever start moves it. After another wall it is 0, and moves not at all.
+equation is f(s) = f(0), and f(0) moves with the state too. Along a path that stays so: the residual
+of a wall met again and again is that of the first start, but each flight begins where f is just
+this, so that f at its own begin moves as much, whatever start moves it. After another wall it is 0,
+and moves not at all.
 
-The second derivatives jump at a knot. Rounding may put a hit on either side of one that is as near as
-binary64 resolves the time of the hit, so both sides' derivatives are enclosed there.
+The second derivatives jump at a knot. Rounding may put a hit on either side of one that is as near
+as binary64 resolves the time of the hit, so both sides' derivatives are enclosed there.
 """
 
 from fractions import Fraction
@@ -79,7 +80,10 @@ def _with_near_knot(course: Course, hit: Hit, moves: list[Interval]) -> Interval
     low, high = exact_ends(hit.time)
     begin = course.arithmetic.number(flight.instant)
     sizes = [begin + hit.time, begin]
-    sizes += [d * at for d, at in zip(moves, (begin, flight.x, flight.y, flight.vx, flight.vy), strict=True)]
+    sizes += [
+        d * at
+        for d, at in zip(moves, (begin, flight.x, flight.y, flight.vx, flight.vy), strict=True)
+    ]
     reach = NEAR * sum(max(map(abs, exact_ends(size))) for size in sizes)
     is_near = course.motion.timeline.knot_between(low - reach, high + reach) is not None
     return course.arithmetic.between(low - reach, high + reach) if is_near else hit.time
@@ -92,7 +96,10 @@ def chained(later: Matrix, earlier: Matrix) -> Matrix:
         later: Jacobian of the last step.
         earlier: d(t, x, y, vx, vy) at its start / d(initial state).
     """
-    rows = [[sum(a * b[j] for a, b in zip(row, earlier, strict=True)) for j in range(5)] for row in later]
+    rows = [
+        [sum(a * b[j] for a, b in zip(row, earlier, strict=True)) for j in range(5)]
+        for row in later
+    ]
     rows[0] = [a + b for a, b in zip(rows[0], earlier[0], strict=True)]
     return rows
 

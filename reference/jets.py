@@ -1,4 +1,7 @@
-"""A function with its first two derivatives: enclosures over an interval of time, or exact numbers."""
+"""A function with its first two derivatives.
+
+Enclosures over an interval of time, or exact numbers.
+"""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -37,7 +40,9 @@ def multiply(p: Jet, q: Jet) -> Jet:
 
 def square(arithmetic: Arithmetic, p: Jet) -> Jet:
     """Return p^2, with f and d1^2 as true squares."""
-    return Jet(arithmetic.square(p.f), _twice(p.f * p.d1), _twice(arithmetic.square(p.d1) + p.f * p.d2))
+    return Jet(
+        arithmetic.square(p.f), _twice(p.f * p.d1), _twice(arithmetic.square(p.d1) + p.f * p.d2)
+    )
 
 
 def united(arithmetic: Arithmetic, jets: Sequence[Jet]) -> Jet:

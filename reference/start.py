@@ -16,7 +16,9 @@ from scene.states import ON_WALL
 def depart(
     arithmetic: Arithmetic, table: PreparedTable, state: State, t_end: Fraction | None
 ) -> Course | Undefined:
-    """Judge the starting state; return the flight from it, or why mathematics gives no answer from there.
+    """Judge the starting state.
+
+    Return the flight from it, or why mathematics gives no answer from there.
 
     Args:
         arithmetic: working precision.
@@ -88,11 +90,16 @@ def _check_part(table: PreparedTable, state: State) -> None:
     if state.wall == "arc" and state.y < 0:
         raise InvalidState(f"state.y = {state.y!r} on wall arc is beyond wall base, must be >= 0")
     if state.wall in SIDES and state.y > 0:
-        raise InvalidState(f"state.y = {state.y!r} on wall {state.wall} is above the stem, must be <= 0")
+        raise InvalidState(
+            f"state.y = {state.y!r} on wall {state.wall} is above the stem, must be <= 0"
+        )
 
 
 def _walls_near(table: PreparedTable, state: State) -> list[Wall]:
-    """List the walls that bound the state's part of the table; in a mushroom the arc ends at the base."""
+    """List the walls that bound the state's part of the table.
+
+    In a mushroom the arc ends at the base.
+    """
     if table.is_cap:
         return ["base", "arc"]
     if table.is_stem:
@@ -122,7 +129,9 @@ def _judge_on_base(table: PreparedTable, state: State, motion: MovingWalls) -> U
     if _is_on(table, state, "arc", motion):
         return Undefined("corner")
     if state.vy < 0:
-        raise InvalidState(f"state.vy = {state.vy!r}: the particle starts on wall base and moves into it")
+        raise InvalidState(
+            f"state.vy = {state.vy!r}: the particle starts on wall base and moves into it"
+        )
     return Undefined("sliding") if state.vy == 0 else None
 
 
@@ -133,14 +142,18 @@ def _is_beside_mouth(table: PreparedTable, state: State, motion: MovingWalls) ->
     return any(sign(motion.wall(wall, motion.arithmetic.zero).f) < 0 for wall in ("left", "right"))
 
 
-def _judge_rise(table: PreparedTable, state: State, wall: Wall, motion: MovingWalls) -> Undefined | bool:
+def _judge_rise(
+    table: PreparedTable, state: State, wall: Wall, motion: MovingWalls
+) -> Undefined | bool:
     """Judge f' at the start on a wall: True if f' = 0 and f'' > 0, False if f' > 0."""
     jet = motion.wall(wall, motion.arithmetic.zero)
     rise = sign(jet.d1)
     if rise > 0:
         return False
     if rise < 0:
-        raise InvalidState(f"state.wall = {wall!r}: the particle starts on this wall and moves into it")
+        raise InvalidState(
+            f"state.wall = {wall!r}: the particle starts on this wall and moves into it"
+        )
     exact = rational.wall_jet(table, state, wall, Fraction(0))
     if not exact.d1.is_zero():
         raise Undecidable("f' at the start has no sign")
@@ -166,7 +179,8 @@ def _check_residual(table: PreparedTable, state: State, motion: MovingWalls) -> 
     low, high = exact_ends(gap)
     least, largest = exact_ends(size)
     if wall in ("left", "right"):
-        # If a stem is wider below, its side is as far from the axis as the state, and x rounds accordingly.
+        # If a stem is wider below, its side is as far from the axis as the state, and x rounds
+        # accordingly.
         least, largest = (max(end, abs(Fraction(state.x))) for end in (least, largest))
     if max(-low, high) <= Fraction(ON_WALL) * least:
         return
@@ -178,7 +192,7 @@ def _check_residual(table: PreparedTable, state: State, motion: MovingWalls) -> 
 
 
 def _distance_of(table: PreparedTable, wall: Wall, motion: MovingWalls) -> Interval:
-    """Return r for the arc, w for a side, h for the floor, the larger of r and w for the base, now."""
+    """Return r for the arc and base, w for a side and the base of a stem, h for the floor."""
     zero = motion.arithmetic.zero
     if wall == "floor":
         return motion.law("h", zero).f

@@ -1,6 +1,7 @@
 """Exact algebra: polynomials and numbers of scenes, their roots and signs, in rational arithmetic.
 
-The laws of a scene become polynomials in half angles or in time, and conditions on them are decided exactly.
+The laws of a scene become polynomials in half angles or in time, and conditions on them are decided
+exactly.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ POWERS_OF_I = ((1, 0, -1, 0), (0, 1, 0, -1))  # real and imaginary parts of i^0 
 
 
 def leg_intervals(legs: Sequence[Law]) -> list[tuple[Fraction, Fraction]]:
-    """Cut one period, shared by these laws with knots, at every time at which one is not analytic."""
+    """Cut the period that laws share at each time at which one of them is not analytic."""
     start = legs[0].breakpoints()[0]
     span = Fraction(0)
     cuts = {start}
@@ -29,7 +30,7 @@ def leg_intervals(legs: Sequence[Law]) -> list[tuple[Fraction, Fraction]]:
 
 
 def leg_polynomial(law: float | Law, start: Fraction) -> Polynomial:
-    """Return a law made of polynomials in the variable t - start, right until its next breakpoint."""
+    """Return a law of polynomials in the variable t - start, up to its next breakpoint."""
     piece = law_of(law).piece_at(start)
     assert piece.is_polynomial
     return piece.polynomial(start)
@@ -56,7 +57,8 @@ def half_angle(law: float | Law, order: int = 0) -> tuple[Polynomial, int]:
             cosine, sine = k * sine, -k * cosine
         # cos(k a) + i sin(k a) = (1 + i x)^(2 k) / (1 + x^2)^k with x = tan(a / 2).
         cos, sin = (
-            [Fraction(comb(2 * k, j) * unit[j % 4]) for j in range(2 * k + 1)] for unit in POWERS_OF_I
+            [Fraction(comb(2 * k, j) * unit[j % 4]) for j in range(2 * k + 1)]
+            for unit in POWERS_OF_I
         )
         wave = add(scale(cos, cosine), scale(sin, sine))
         total = add(total, multiply(wave, one_plus_square(n - k)))
@@ -77,7 +79,9 @@ def trimmed(p: Polynomial) -> Polynomial:
 def add(p: Polynomial, q: Polynomial) -> Polynomial:
     """Return p + q."""
     n = max(len(p), len(q))
-    return trimmed([(p[i] if i < len(p) else Fraction(0)) + (q[i] if i < len(q) else 0) for i in range(n)])
+    return trimmed(
+        [(p[i] if i < len(p) else Fraction(0)) + (q[i] if i < len(q) else 0) for i in range(n)]
+    )
 
 
 def multiply(p: Polynomial, q: Polynomial) -> Polynomial:
@@ -120,7 +124,7 @@ def _primitive(p: Polynomial) -> Polynomial:
 
 
 def divide(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """Return quotient and remainder of p by q != 0, each up to a positive factor, with coprime integers.
+    """Return quotient and remainder of p by q != 0, each up to a factor, in coprime integers.
 
     All intermediate numbers are whole, because fractions would be reduced at every step.
     """
@@ -135,13 +139,16 @@ def divide(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
         quotient[shift] = factor
         for i, b in enumerate(divisor):
             rest[shift + i] -= factor * b
-    return _primitive(trimmed(list(map(Fraction, quotient)))), _primitive(trimmed(list(map(Fraction, rest))))
+    return _primitive(trimmed(list(map(Fraction, quotient)))), _primitive(
+        trimmed(list(map(Fraction, rest)))
+    )
 
 
 class Sturm:
     """Counts the distinct real roots of a polynomial in intervals.
 
-    The chain of p and p' ends in their common divisor. Divided by it, its first part has each root of p once.
+    The chain of p and p' ends in their common divisor. Divided by it, its first part has each root
+    of p once.
     """
 
     def __init__(self, p: Polynomial) -> None:
@@ -151,7 +158,9 @@ class Sturm:
             chain.append(scale(divide(chain[-2], chain[-1])[1], Fraction(-1)))
         self.chain = [divide(part, chain[-2])[0] for part in chain[:-1]]
         self.root_free_of_squares = self.chain[0]
-        self._variations = cache(self._count_variations)  # intervals that are halved share their ends
+        self._variations = cache(
+            self._count_variations
+        )  # intervals that are halved share their ends
 
     def _count_variations(self, x: Fraction) -> int:
         signs = [v > 0 for v in (at(q, x) for q in self.chain) if v != 0]

@@ -22,10 +22,12 @@ SHOWN = "".join(c if " " <= c <= "~" else f"\\u{ord(c):04x}" for c in f"^[^{HIDD
 
 
 def catalogue() -> list[str]:
-    """Return the names of the scenes that ship with the package, `moving-cap-as-printed` included."""
+    """Return the names of the scenes that ship with the package, also of the refused one."""
     folder = resources.files("scene") / "catalogue"
     return sorted(
-        entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
+        entry.name.removesuffix(".toml")
+        for entry in folder.iterdir()
+        if entry.name.endswith(".toml")
     )
 
 
@@ -61,7 +63,11 @@ def read_data(source: str | Path) -> Any:
         if path.is_fifo() or path.is_char_device():  # which may have no end, or never begin
             raise OSError(errno.EINVAL, "it is a pipe or a device, must be a file")
         text = path.read_text("utf-8-sig")  # without the mark that some editors put before it
-        return tomllib.loads(text) if path.suffix == ".toml" else json.loads(text, object_pairs_hook=_once)
+        return (
+            tomllib.loads(text)
+            if path.suffix == ".toml"
+            else json.loads(text, object_pairs_hook=_once)
+        )
     except OSError as error:
         raise InvalidScene(f"scene {name!r} cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
@@ -70,7 +76,10 @@ def read_data(source: str | Path) -> Any:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object. Refuse a key that stands twice, as TOML does: one value would be lost."""
+    """Return a JSON object. Refuse a key that stands twice, as TOML does.
+
+    One value would be lost.
+    """
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:
@@ -144,7 +153,10 @@ def _at(data: Any, names: list[str]) -> Any:
 
 
 def to_data(scene: Scene) -> dict[str, Any]:
-    """Return a scene as plain data, in the form of the protocol. A law keeps its `omega` or its `period`."""
+    """Return a scene as plain data, in the form of the protocol.
+
+    A law keeps its `omega` or its `period`.
+    """
     check_scene(scene)
     data: dict[str, Any] = msgspec.to_builtins(scene)
     return {name: _without_none(field) for name, field in data.items()}
@@ -177,7 +189,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def limit_definitions(definitions: dict[str, Any]) -> None:
-    """Put what a schema can say of the rules for scenes (`scene.protocol.rules`) into its definitions."""
+    """Put what a schema can say of `scene.protocol.rules` into its definitions."""
     fourier = definitions["Fourier"]
     knots = definitions["BangBang"]["properties"]["knots"]
     for field in ("omega", "period"):
@@ -189,7 +201,9 @@ def limit_definitions(definitions: dict[str, Any]) -> None:
     mushroom = definitions["Mushroom"]
     for field in ("w", "nu"):
         forms = mushroom["properties"][field]["anyOf"]
-        mushroom["properties"][field] = {"anyOf": [form for form in forms if form != {"type": "null"}]}
+        mushroom["properties"][field] = {
+            "anyOf": [form for form in forms if form != {"type": "null"}]
+        }
     mushroom["oneOf"] = [{"required": ["w"]}, {"required": ["nu"]}]
     for table in ("Cap", "Stem", "Mushroom"):
         for field in ("name", "notes"):

@@ -1,4 +1,4 @@
-"""Scenes by name: those of the catalogue, and those that the audit of the paper needs beside them."""
+"""Scenes by name: those of the catalogue, and those that only the audit of the paper needs."""
 
 from scene.laws import BangBang, Fourier
 from scene.load import catalogue, load
@@ -35,7 +35,16 @@ SCENES: dict[str, Scene] = {
         # Two turns, each on another loop in another time: shapes return only more or less (C10).
         _fixed_cap(
             2.0,
-            {0: 1, 0.3125: 0.3, 0.5: 0.3, 0.6875: 0.98, 0.9375: 0.98, 1.25: 0.25, 1.59375: 0.25, 1.8125: 1},
+            {
+                0: 1,
+                0.3125: 0.3,
+                0.5: 0.3,
+                0.6875: 0.98,
+                0.9375: 0.98,
+                1.25: 0.25,
+                1.59375: 0.25,
+                1.8125: 1,
+            },
             {0: 6, 0.3125: 6, 0.5: 2, 0.6875: 2, 0.9375: 5.5, 1.25: 5.5, 1.59375: 1.9, 1.8125: 1.9},
             name="fixed-cap-irregular",
         ),

@@ -1,19 +1,19 @@
 """Tables: cap, stem and mushroom, and the walls that each of them has.
 
-A scene is a table with its laws of motion. It is proved valid when it is made: by a constructor, by decoding,
-by replacing a field, by unpickling. (`msgspec.structs.force_setattr` and a subclass that replaces
-`__post_init__` bypass the proof.) The tables are:
+A scene is a table with its laws of motion. It is proved valid when it is made: by a constructor, by
+decoding, by replacing a field, by unpickling. (`msgspec.structs.force_setattr` and a subclass that
+replaces `__post_init__` bypass the proof.) The tables are:
     Cap:      x^2 + y^2 <= r(t)^2, y >= 0, the base closed;
     Stem:     |x| <= w(t) + slope(t) y, -h(t) <= y <= 0, the top closed;
     Mushroom: both, joined through the mouth y = 0, |x| < w(t).
 The mouth is given by `w` (half-width, a length) or by `nu` (w = nu r).
 
-A scene is valid if r, h, w > 0, w <= r and w > h slope at all times, and if all its moving laws have
-exactly the same period. The proof covers one period, and the theory is about cycles. The period of a
-bang-bang law is rational. That of a Fourier law with `omega` is 2 pi / omega, which is irrational, so the
-two never agree. A Fourier law with `period` can agree with a bang-bang law. A law that moves several times
-faster is written with higher harmonics (the k-th number of `cos` and `sin` belongs to k omega) or with
-repeated knots.
+A scene is valid if r, h, w > 0, w <= r and w > h slope at all times, and if all its moving laws
+have exactly the same period. The proof covers one period, and the theory is about cycles. The
+period of a bang-bang law is rational. That of a Fourier law with `omega` is 2 pi / omega, which is
+irrational, so the two never agree. A Fourier law with `period` can agree with a bang-bang law. A
+law that moves several times faster is written with higher harmonics (the k-th number of `cos` and
+`sin` belongs to k omega) or with repeated knots.
 """
 
 import re
@@ -75,7 +75,9 @@ class _Table(
     def laws(self) -> Mapping[str, Law]:
         """Return the laws that the table gives, by the names of its parameters."""
         given = {name: getattr(self, name, None) for name in PARAMETERS}
-        return MappingProxyType({name: law_of(law) for name, law in given.items() if law is not None})
+        return MappingProxyType(
+            {name: law_of(law) for name, law in given.items() if law is not None}
+        )
 
     @cached_property
     def width(self) -> Law | Product:
@@ -100,7 +102,7 @@ class _Table(
 
 
 def _check_text(field: str, text: object) -> None:
-    """Refuse a value that is not text, and characters that a terminal, page or picture cannot show."""
+    """Refuse what is not text, and characters that no terminal, page or picture shows."""
     if not isinstance(text, str):
         raise InvalidScene(f"{field} = {shown(text)}, must be text")
     found = HIDDEN.search(text)
@@ -157,7 +159,11 @@ def check_scene(scene: object) -> None:
     # A scene is proved valid when it is made; a subclass could omit the proof.
     if type(scene) in (Cap, Stem, Mushroom):
         return
-    hint = f"; a name or a file is loaded by scene.load({shown(scene)})" if isinstance(scene, str) else ""
+    hint = (
+        f"; a name or a file is loaded by scene.load({shown(scene)})"
+        if isinstance(scene, str)
+        else ""
+    )
     raise BadInput(f"scene = {shown(scene)}, must be a Cap, a Stem or a Mushroom{hint}")
 
 
@@ -182,22 +188,28 @@ def period(scene: Scene) -> Period | None:
 
 @lru_cache(maxsize=4096)
 def _prove(table: type[_Table], given: tuple[GivenLaw | None, ...]) -> None:
-    # Cached by value: -0.0 and 0.0 count as equal, and validity is a matter of real numbers. A refusal is
-    # not kept, so its message shows the numbers at hand.
-    found = {name: law_of(law) for name, law in zip(PARAMETERS, given, strict=True) if law is not None}
+    # Cached by value: -0.0 and 0.0 count as equal, and validity is a matter of real numbers. A
+    # refusal is not kept, so its message shows the numbers at hand.
+    found = {
+        name: law_of(law) for name, law in zip(PARAMETERS, given, strict=True) if law is not None
+    }
     if table is Mushroom and (("w" in found) == ("nu" in found)):
         raise InvalidScene("a mushroom needs exactly one of `w` and `nu`")
     prove(found, _conditions(found))
 
 
 def _conditions(found: dict[str, Law]) -> list[Condition]:
-    """List what must hold at all times for a table with these laws (sec. 2, here with a strict apex)."""
-    listed = [Condition(f"{name} > 0", ((1, (law,)),)) for name, law in found.items() if name != "slope"]
+    """List what must hold at all times with these laws (sec. 2, with a strict apex)."""
+    listed = [
+        Condition(f"{name} > 0", ((1, (law,)),)) for name, law in found.items() if name != "slope"
+    ]
     if "h" not in found:
         return listed
     width: tuple[Law, ...] = (found["nu"], found["r"]) if "nu" in found else (found["w"],)
     if "nu" in found:
-        listed.append(Condition("nu <= 1", ((1, (Constant(1.0),)), (-1, (found["nu"],))), is_strict=False))
+        listed.append(
+            Condition("nu <= 1", ((1, (Constant(1.0),)), (-1, (found["nu"],))), is_strict=False)
+        )
     elif "r" in found:
         listed.append(Condition("w <= r", ((1, (found["r"],)), (-1, width)), is_strict=False))
     return [*listed, Condition("w > h slope", ((1, width), (-1, (found["h"], found["slope"]))))]

@@ -19,7 +19,7 @@ class Fate(Enum):
     """Why a particle met no wall.
 
     Attributes:
-        code: what kernels hand back; the families HORIZON, undefined, undecided, rejected follow each other.
+        code: what kernels hand back; from HORIZON's on, in any order.
         outcome: the class of the answer.
     """
 

@@ -15,7 +15,6 @@ from support.depth import deep_among, deep_but
 import theory
 from scene import BangBang, Fourier, Mushroom, load
 from scene.geometry import table_at
-from scene.tables import laws
 from scene.transforms import backwards
 from theory import NotCovered, cumulants
 from theory.finite_energy import rates
@@ -302,7 +301,7 @@ def later(law):
 @pytest.mark.parametrize("written", [padded, later])
 def test_a_measured_cycle_is_known_however_it_is_written(name, written):
     scene = load(name)
-    again = Mushroom(**{field: written(law) for field, law in laws(scene).items()})
+    again = Mushroom(**{field: written(getattr(scene, field)) for field in scene.laws})
     assert frozen_rates(again)[0] is frozen_rates(scene)[0]
     assert frozen_rates(backwards(again))[0] is frozen_rates(scene)[0]
 

@@ -34,8 +34,6 @@ from scene import (
     Undecided,
 )
 from scene.geometry import half_width, table_at
-from scene.laws import bounds, is_constant
-from scene.tables import laws
 
 FINE, COARSE = 2.0**-36, SLACK * BOUND  # of sizes
 FLIGHT = 2.0**-48  # of sizes: a straight flight, of a stepper that is fine
@@ -100,12 +98,12 @@ def _first_flaw(
     margin = place + aside * pace / size
     # A wall that turns soon has another speed at a time that is rounded.
     turning = sum(
-        bounds(law).curvature * (size if name in ("nu", "slope") else 1.0)
-        for name, law in laws(scene).items()
+        law.bounds().curvature * (size if name in ("nu", "slope") else 1.0)
+        for name, law in scene.laws.items()
     )
     rounding = margin + aside * turning / pace
     off_before = np.abs(kept) / np.append(now.r if start.wall == "arc" else 1.0, steep[:-1]) / size
-    is_at_rest = all(is_constant(law) for law in laws(scene).values())
+    is_at_rest = scene.cycle is None
     gained = is_at_rest * np.abs(np.hypot(vx, vy) / hypot(start.vx, start.vy) - 1.0)
     spin = np.abs(np.abs(x * vy - y * vx) - abs(start.x * start.vy - start.y * start.vx))
     flaws = {

@@ -57,7 +57,7 @@ if sys.version_info < (3, 10):  # noqa: UP036 - people run this file alone
     sys.exit(2)
 
 PRECISIONS = (128, 256, 512, 1024, 2048, 4096)  # bits, tried in turn
-WORK = 2_400_000  # units of work for a line, of some 5 microseconds each: about 12 seconds in all
+WORK = 2_700_000  # units of work for a line, of some 5 microseconds each: about 13 seconds in all
 COST = {"arc": 9, "left": 6, "right": 6}  # units of work for f of a wall; 3 for any other one
 SHARE = Fraction(61, 128)  # where a stretch is cut: not in the middle, where a root may well lie
 NEAR = Fraction(1, 2**20)  # how far from its wall a state may lie, as a share of the wall's size

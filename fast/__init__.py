@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         trajectory,
     )
     from fast.step import next_collision
+    from fast.warming import kept_in, warm
 
 __all__ = [
     "Collisions",
@@ -31,9 +32,11 @@ __all__ = [
     "flow",
     "follow",
     "go_on",
+    "kept_in",
     "next_collision",
     "simulate",
     "trajectory",
+    "warm",
 ]
 
 _MODULES = {
@@ -49,6 +52,7 @@ _MODULES = {
         "trajectory",
     ),
     "step": ("next_collision",),
+    "warming": ("kept_in", "warm"),
 }
 
 

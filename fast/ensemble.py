@@ -48,7 +48,6 @@ from scene.geometry import table_at
 from scene.mouth import start_time
 from scene.notebook import rows
 from scene.refusal import BadInput, check_count, shown
-from scene.tables import laws
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
 KINDS: dict[type[Any], int] = {
@@ -542,7 +541,7 @@ def go_on(
     plan = planned(scene, n_particles, energy, n_cycles, seed, first, threads, phases, progress)
     asked: dict[str, Any] = {
         "table": type(scene).__name__,
-        **laws(scene),
+        **{name: law.as_field() for name, law in scene.laws.items()},
         "n_particles": plan.size[0],
         "energy": plan.energy0,
         "seed": plan.seed,

@@ -17,19 +17,18 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from mpmath import fp
 
 from fast.ensemble import follow_many, least_collisions, only_stop
 from fast.kernel import records
 from fast.kernel.fates import MOST_TO_A_TIME, Fate
 from fast.kernel.fine_step import FineState, fine_path
 from fast.kernel.follow import follow_particles
-from fast.kernel.path import PATHS
+from fast.kernel.path import path_kernel
 
 from fast.kernel.records import (  # isort: skip
     ANCHORS_SHAPE, ANSWER_LOST, Compiled, FloatArray, IntArray, Particle, unfilled_ends,
 )  # fmt: skip
-from fast.kernel.worker import Loops, careful_at, follow_path, new_worker
+from fast.kernel.worker import Loops, follow_path, new_worker
 from fast.prepared import prepare
 
 from fast.step import (  # isort: skip
@@ -41,8 +40,6 @@ from fast.validation import (  # isort: skip
     MAX_STEPS, check_end, check_energy, check_states, check_threads,
 )  # fmt: skip
 from scene import InvalidState, Mushroom, Outcome, Rejected, Scene, State, Undecided, Wall, check_scene
-from scene.geometry import half_width
-from scene.laws import values
 from scene.refusal import BadInput, check_count, check_number, shown
 
 NAMES = np.array([WALL_NAMES[code] for code in range(len(WALL_NAMES))], dtype=object)
@@ -93,13 +90,13 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     exponents = units.of_step()
     rows, (wall,) = as_arrays([start])
     stop = only_stop(units.horizon(t_end))
-    worker = new_worker(in_lanes, stop, unfilled_ends(rows), loops=Loops(careful_at(), 0, 0))
+    kernel, step_at = path_kernel(in_lanes.is_slope_moving, in_lanes.form, n_collisions)
+    worker = new_worker(in_lanes, stop, unfilled_ends(rows), loops=Loops(step_at, 0, 0))
     # Steps are brought back in passing: a pass of its own took a quarter of the time.
     halves = np.stack([exponents // 2, exponents - exponents // 2])
     factors = np.ldexp(1.0, np.vstack([halves, -halves]))
     steps, walls = np.empty((n_collisions, 6)), np.empty(n_collisions, np.int64)
-    kernel = PATHS[in_lanes.is_slope_moving, in_lanes.form]
-    with np.errstate(over="ignore", under="ignore"):  # without the compiler
+    with np.errstate(all="ignore"):  # of what Python follows
         n, code = follow_path(kernel, (worker, wall, factors, steps, walls), n_collisions, stop.called_off)
     steps = steps[:n] if n == n_collisions else steps[:n].copy()  # not all room is held
     outcome: Outcome | None = None
@@ -284,7 +281,8 @@ def sin_phi(scene: Scene, states: FloatArray, hits: npt.NDArray[np.int64]) -> tu
         (m,) sin of the angle to the normal before the bounce, clockwise > 0 (Eq:sinphi); (m,) nu.
     """
     before, (t, x, y, vx, vy) = states[hits], states[hits + 1].T
-    r, w = values(scene.r, t), half_width(fp, scene, t)  # type: ignore[union-attr]  # no stem has an arc
+    r = scene.laws["r"].values(t)
+    w = scene.width.values(t)
     # The speed of the flight that ends here; the bounce keeps the angular momentum about the centre.
     sine: FloatArray = (y * vx - x * vy) / (np.hypot(before[:, 3], before[:, 4]) * r)
     return sine, w / r

@@ -22,14 +22,14 @@ import numpy as np
 
 from fast.kernel.arithmetic import HALF_PI, MAX_QUADRANT, SAFETY, split
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, PARABOLA, SERIES, TWO_WAVES, fill_pieces
+from fast.kernel.laws import IN_LANES
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, BANG_BANG, BEND, CONSTANT, DEPTH, FASTEST, FOURIER, HIGHEST, KIND, KNOTS, LEVEL, LOWEST,
     N_HARMONICS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled,
     FloatArray, LaneWaves, LawLimits, LawsInLanes, Pieces,
 )  # fmt: skip
-from scene import Scene, tables
-from scene.laws import breakpoints, is_constant
+from scene import Scene
 
 SHALLOW = 0.25  # of its mean: see `waves_of`
 MAX_PIECES = 2**15
@@ -58,8 +58,13 @@ def laws_in_lanes(scene: Scene, compiled: Compiled) -> LawsInLanes:
         scene: in the kernel's units.
         compiled: its numbers.
     """
-    laws, waves = compiled.laws, waves_of(compiled)
-    if waves:
+    laws = compiled.laws
+    is_known = bool(np.isin(laws[:SHARED, KIND], IN_LANES).all())
+    waves = waves_of(compiled) if is_known else None
+    form = PARABOLA
+    if not is_known:
+        pieces = NO_PIECES
+    elif waves:
         form = TWO_WAVES if laws[SHARED, N_HARMONICS] > 1 else ONE_WAVE
         # Of waves the lanes know when they repeat, and up to when their phase is known.
         period = float(_period_and_origin(laws)[0]) if laws[SHARED, OMEGA] else math.inf
@@ -225,5 +230,5 @@ def _period_and_origin(laws: FloatArray) -> tuple[Fraction, Fraction]:
 
 def _knots(scene: Scene, period: Fraction, origin: Fraction) -> set[Fraction]:
     """Return the times since the origin, inside the period, of all knots and of the middles of legs."""
-    moving = (law for law in tables.laws(scene).values() if not is_constant(law))
-    return {(t - origin) % period for law in moving for t in breakpoints(law)} - {Fraction(0)}
+    moving = (law for law in scene.laws.values() if not law.is_constant)
+    return {(t - origin) % period for law in moving for t in law.breakpoints()} - {Fraction(0)}

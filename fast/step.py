@@ -10,7 +10,6 @@ import numpy as np
 from fast.kernel import records, single
 from fast.kernel.fates import FATES, Fate
 from fast.kernel.records import FloatArray, IntArray, Particle
-from fast.kernel.worker import careful_at
 from fast.prepared import Prepared, prepare
 from fast.units import LateTime, Units
 from scene import (
@@ -65,8 +64,8 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
             state, t_end = check_numbers(scene, state, t_end), float(t_end)
         prepared = prepare(scene)
         t, x, y, vx, vy, wall = state.t, state.x, state.y, state.vx, state.vy, WALL_CODES[state.wall]
-        ask = single.single_at_once()
-        code, dt, t, x, y, vx, vy = ask(careful_at(), prepared.packed, t, x, y, vx, vy, wall, t_end)
+        ask, step_at = single.asking()
+        code, dt, t, x, y, vx, vy = ask(step_at, prepared.packed, t, x, y, vx, vy, wall, t_end)
         if code == records.BAD_QUESTION:  # by checks in compiled code: those that follow say why
             start_at(prepared, state, t_end)[1].horizon(t_end)
     except LateTime as error:
@@ -103,7 +102,7 @@ def fitted_start(prepared: Prepared, state: State) -> tuple[Particle, Units]:
     t, x, y, vx, vy = units.numbers(state)
     particle = Particle(t, 0.0, x, y, vx, vy, WALL_CODES[state.wall])
     if state.wall is not None:
-        share = single.off_wall(careful_at(), prepared.compiled, particle)
+        share = single.share_off_wall(prepared.compiled, particle)
         if share:
             away = f"{share:.3g} of that wall's size"
             raise InvalidState(f"state.wall = {state.wall!r}, but the state is {away} away from that wall")

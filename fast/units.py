@@ -15,25 +15,22 @@ the numbers that the kernels read.
 import math
 import sys
 from copy import copy
-from fractions import Fraction
-from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from fast.kernel import records
-from fast.kernel.arithmetic import HALF_PI, split
 from fast.kernel.fates import Fate
+from fast.kernel.laws import omega_of, row_of
 from fast.kernel.single import LARGEST, LENGTH, TIME
 
 from fast.kernel.records import (  # isort: skip
-    BANG_BANG, CONSTANT, FOURIER, KIND, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, BoolArray, Compiled,
+    FOURIER, KIND, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, BoolArray, Compiled,
     FloatArray, IntArray,
 )  # fmt: skip
-from scene import BadInput, BangBang, Fourier, InvalidScene, InvalidState, Law, Scene, State
+from scene import BadInput, InvalidScene, InvalidState, Law, Scene, State
 from scene.laws import Constant, times_power
-from scene.pieces import Period
 
 ABSENT = Constant(0.0)  # a law that a table does not have
 TABLES = {"Cap": int(records.CAP), "Stem": int(records.STEM), "Mushroom": int(records.MUSHROOM)}
@@ -59,47 +56,17 @@ def compile_scene(scene: Scene) -> Compiled:
 def _laid_out(scene: Scene) -> Compiled:
     r, h, slope = (scene.laws.get(name, ABSENT) for name in ("r", "h", "slope"))
     width = scene.width
-    rows = [_row(law) for law in (r, width.factors[0], h, slope)]
+    rows = [row_of(law) for law in (r, width.factors[0], h, slope)]
     table = np.zeros((len(rows) + 1, max(OMEGA_LOW + 1, *(len(row) for row in rows))))
     for i, row in enumerate(rows):
         table[i, : len(row)] = row
     waves = [row for row in rows if row[KIND] == FOURIER]
     if waves:
         assert scene.cycle is not None
-        table[SHARED, OMEGA], table[SHARED, OMEGA_LOW] = _omega(scene.cycle)
+        table[SHARED, OMEGA], table[SHARED, OMEGA_LOW] = omega_of(scene.cycle)
         table[SHARED, N_HARMONICS] = max(row[N_HARMONICS] for row in waves)
     limits = np.array([r.size_bounds(), width.size_bounds(), h.size_bounds(), slope.bounds()])
     return Compiled(TABLES[type(scene).__name__], len(width.factors) == 2, table, limits)
-
-
-def _omega(cycle: Period) -> tuple[float, float]:
-    """Return a frequency as a sum of two floats: exact if given, else 2 pi / period to 2^-106."""
-    if cycle.omega is not None:
-        return cycle.omega, 0.0
-    assert cycle.length is not None
-    high, low = split(4 * HALF_PI / cycle.length)
-    return high, low
-
-
-def _row(law: Law) -> list[float]:
-    """Lay out one law for the kernels: the only function of this package that asks for a law's kind."""
-    if law.cycle is None:
-        return [CONSTANT, law.level, 0.0, 0.0]
-    match law:
-        case Fourier():
-            harmonics = list(zip_longest(law.cos, law.sin, fillvalue=0.0))
-            cos, sin = zip(*harmonics, strict=True)
-            return [FOURIER, law.mean, _omega(law.cycle)[0], len(harmonics), *cos, *sin]
-        case BangBang():
-            times, values = zip(*law.knots, strict=True)
-            accelerations = [
-                4 * (Fraction(v1) - Fraction(v0)) / (Fraction(t1) - Fraction(t0)) ** 2
-                for (t0, v0), (t1, v1) in pairwise(law.knots)
-            ] + [Fraction(0)]  # one for every knot keeps the columns simple
-            highs, lows = zip(*map(split, accelerations), strict=True)
-            period, period_low = split(law.length)
-            return [BANG_BANG, 0.0, period, len(times), period_low, *times, *values, *highs, *lows]
-    raise TypeError(f"{type(law).__name__}: fast has no kernel for this kind of law")
 
 
 class LateTime(InvalidState):

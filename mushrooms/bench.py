@@ -1,6 +1,7 @@
 """`mushrooms bench`: speed against error on the same runs, and error growth.
 
-Our steppers are among the solvers that are measured, and the proofs are what all are measured against.
+Our steppers are among the solvers that are measured, and the proofs are what all are measured
+against.
 """
 
 import math
@@ -45,7 +46,9 @@ from scene import BadInput, Collision, Scene, State
 from scene.files.writer import write_files
 from scene.refusal import refuse_unheeded
 
-TIMEOUT, RESTARTS = 30.0, 1  # of a command
+# Of a command.
+TIMEOUT = 30.0
+RESTARTS = 1
 # By size: questions of a workload, steps with walls only, runs, trajectories and their length.
 QUESTIONS = {"quick": 12, "full": 64}
 FURTHER = {"quick": 200, "full": 2000}
@@ -55,8 +58,8 @@ PATHS = {"quick": (3, 40), "full": (9, 80)}
 DIGITS = (15, 30, 50, 100, 200)  # of the proofs that are timed
 PATH_DIGITS = (30, 60)  # working decimals of the proofs whose growth is followed
 LANES_SERVE = (
-    "breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12", "two-harmonics",
-    "sixteen-harmonics", "moving-slope", "bang-bang", "one-path",
+    "breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12",
+    "two-harmonics", "sixteen-harmonics", "moving-slope", "bang-bang", "one-path",
 )  # fmt: skip
 
 
@@ -82,7 +85,10 @@ class BenchOptions:
 
 
 def measure_solvers(options: BenchOptions) -> None:
-    """Measure speed against error and write it into a folder; or print a table of an earlier benchmark."""
+    """Measure speed against error and write it into a folder.
+
+    Or print a table of an earlier benchmark.
+    """
     if options.table is not None:
         measuring = {"--quick": options.quick or None, "COMMAND": options.command or None}
         refuse_unheeded(measuring, "--table measures nothing")
@@ -130,6 +136,7 @@ def _measure(size: Size, seed: int, command: Sequence[str]) -> Record:
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
+            fast.warm(workload.scene)  # what is measured is compiled code
             found, failures = solvers.measure(workload, running, effort, tick)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in failures.items()}
@@ -146,7 +153,8 @@ def _measure(size: Size, seed: int, command: Sequence[str]) -> Record:
         digits=workloads.DIGITS,
         machine=record.this_machine(built),
         workloads=tuple(
-            record.Drawn(rule.name, rule.what, rule.scene, n_questions, n_further) for rule in workloads.RULES
+            record.Drawn(rule.name, rule.what, rule.scene, n_questions, n_further)
+            for rule in workloads.RULES
         ),
         points=tuple(points),
         not_run=not_run,
@@ -155,7 +163,9 @@ def _measure(size: Size, seed: int, command: Sequence[str]) -> Record:
     )
 
 
-def _solvers(stack: ExitStack, command: Sequence[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
+def _solvers(
+    stack: ExitStack, command: Sequence[str]
+) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
     """Return solvers, what was compiled, and what cannot run."""
     limits = Limits(TIMEOUT, RESTARTS)
     found = [*our_solvers(), *baselines.in_python()]
@@ -187,8 +197,13 @@ def _solvers(stack: ExitStack, command: Sequence[str]) -> tuple[list[Solver], di
     return found, built, not_run
 
 
-def prove_path(scene: Scene, state: State, n_collisions: int) -> tuple[list[PathPoint], list[Sensitivity]]:
-    """Follow a path by proof, right to twenty digits at its end, and chain the Jacobians of its steps."""
+def prove_path(
+    scene: Scene, state: State, n_collisions: int
+) -> tuple[list[PathPoint], list[Sensitivity]]:
+    """Follow a path by proof and chain the Jacobians of its steps.
+
+    Twenty digits are right at its end.
+    """
     path = reference.trajectory(scene, state, n_collisions, digits=20, is_differentiated=True)
     links = Links(state)
     chain = [Sensitivity(links.add(step), links.held[0]) for step in path.steps]
@@ -208,7 +223,10 @@ def our_solvers() -> list[Solver]:
 
 
 def our_followers() -> dict[str, PathFollower]:
-    """Return followers of trajectories: binary64, with compensated time, and proofs of fixed precision."""
+    """Return followers of trajectories.
+
+    They use binary64, compensated time, or proofs of fixed precision.
+    """
     return {
         "binary64 (plain Python)": _plain_path,
         "compensated (fast)": _fast_path,
@@ -245,7 +263,10 @@ def _fine(workload: Workload, n_times: int) -> SolverRun:
 
 
 def _lanes(workload: Workload, n_times: int) -> SolverRun:
-    """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
+    """Time the engine on flights that go on from the questions.
+
+    Grade one round of its lanes on these.
+    """
     states = [q.state for q in workload.questions]
     copies = -(-128 // len(states))  # enough to fill both pools
     followed = states[:1] if workload.rule.length else states * copies
@@ -256,18 +277,25 @@ def _lanes(workload: Workload, n_times: int) -> SolverRun:
         run, lasted = carry(workload.scene, followed, [None] * len(followed), t_end, 1)
         n_collisions = n_collisions + int(run.wall_counts.sum())
         seconds = seconds + lasted
-    return SolverRun(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
+    return SolverRun(
+        seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9
+    )
 
 
 def _trajectory(workload: Workload, n_times: int) -> SolverRun:
-    """Time a path from the first question, the call and its arrays included; grade a step from each."""
+    """Time a path from the first question, the call and its arrays included.
+
+    Grade a step from each.
+    """
     states = [q.state for q in workload.questions]
     paths = [fast.trajectory(workload.scene, state, 1) for state in states]
     begin = time.perf_counter_ns()
     for _ in range(n_times):
         fast.trajectory(workload.scene, states[0], workload.rule.length)
     ns = time.perf_counter_ns() - begin
-    answers: list[SolverAnswer] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
+    answers: list[SolverAnswer] = [
+        Collision(path.walls[0], *path.steps[0].tolist()) for path in paths
+    ]
     return SolverRun(ns / (n_times * workload.rule.length), answers, ns)
 
 
@@ -278,7 +306,9 @@ def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint
 
 def _fast_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
     path = fast.trajectory(scene, state, n_collisions)
-    return [PathPoint(wall, *row[2:]) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)]
+    return [
+        PathPoint(wall, *row[2:]) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)
+    ]
 
 
 def _fine_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:

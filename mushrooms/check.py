@@ -1,4 +1,4 @@
-"""`mushrooms check`: the conformance suite on a command, with its progress, summary and report files."""
+"""`mushrooms check`: the conformance suite on a command, its progress, summary and report files."""
 
 import secrets
 import shlex
@@ -163,7 +163,9 @@ def _report_files(options: CheckOptions) -> dict[Path, Callable[[Run], bytes | s
         if path is not None:
             check_file(path, (suffix,))
             if path in files:
-                raise BadInput(f"output {str(path)!r} is asked for twice, must be a file for each report")
+                raise BadInput(
+                    f"output {str(path)!r} is asked for twice, must be a file for each report"
+                )
             files[path] = content
     return files
 
@@ -172,7 +174,9 @@ def show(run: Run) -> None:
     """Print verdicts by group, with every denominator, and what stands against success."""
     groups = [*(reports.summarise(run, group) for group in run.groups()), reports.summarise(run)]
     seen = [verdict for verdict in VERDICTS if verdict == "pass" or groups[-1].counts[verdict]]
-    verdicts = [Column(verdict, style=COLOURS.get(verdict, "bold red"), justify="right") for verdict in seen]
+    verdicts = [
+        Column(verdict, style=COLOURS.get(verdict, "bold red"), justify="right") for verdict in seen
+    ]
     numbers = [Column(name, justify="right") for name in ("worst ulps", "A/B/C", "class")]
     heads = [Column("group", no_wrap=True), Column("cases", justify="right"), *verdicts, *numbers]
     table = Table(*heads, title=_title(run))
@@ -206,7 +210,10 @@ def _show_measured(console: Console, run: Run) -> None:
 
 
 def _show_objections(console: Console, run: Run) -> None:
-    """Print why the run does not succeed: what was given beside what is certified, and what fails alike."""
+    """Print why the run does not succeed.
+
+    What was given stands beside what is certified; what fails alike is named.
+    """
     objections = run.objections()
     for line in objections[:MAX_SHOWN]:
         console.print(f"[red]{escape(line)}[/]")
@@ -232,7 +239,7 @@ def _show_objections(console: Console, run: Run) -> None:
 
 
 def _show_stderr(console: Console, run: Run) -> None:
-    """Print the end of the standard error of an implementation that crashed or broke the protocol."""
+    """Print how the standard error ends if a process crashed or broke the protocol."""
     wrong = [result for result in run.results if not result.is_right]
     is_broken = any(result.verdict == "crashed" or result.group == "protocol" for result in wrong)
     lines = run.stderr.split("\n")
@@ -284,14 +291,22 @@ def write_questions(path: Path, level: str, seed: int | None) -> None:
                 raise BadInput(f"--questions = {str(path)!r} is not empty, must be a new folder")
             sheet = _draw_sheet(level, seed)
             n = write_tables(sheet, folder)
-    more = f", {len(sheet.questions) - n} left out that CSV cannot hold" if n < len(sheet.questions) else ""
+    more = (
+        f", {len(sheet.questions) - n} left out that CSV cannot hold"
+        if n < len(sheet.questions)
+        else ""
+    )
     print(f"{n} questions of level {level} and seed {seed}{more}: {path}")
     print(f"Grade the answers with: mushrooms check --questions {path} --answers FILE")
 
 
 def _draw_sheet(level: str, seed: int) -> Sheet:
     """Return the questions of a run, and say that they take a while: many are proved anew."""
-    print(f"drawing and proving the questions of seed {seed}: some 20 seconds", file=sys.stderr, flush=True)
+    print(
+        f"drawing and proving the questions of seed {seed}: some 20 seconds",
+        file=sys.stderr,
+        flush=True,
+    )
     return Sheet(level, seed)
 
 
@@ -300,7 +315,8 @@ def grade_file(answers: Path, questions: Path | None, level: str, seed: int | No
 
     Args:
         answers: the file, or a folder of CSV files.
-        questions: what they answer, where the key is beside it; else the fresh questions are proved anew.
+        questions: what they answer, where the key is beside it; else the fresh questions are proved
+            anew.
         level: of the questions, where nothing else tells.
         seed: likewise; None where the answers tell it.
 
@@ -315,5 +331,7 @@ def grade_file(answers: Path, questions: Path | None, level: str, seed: int | No
         return grade_answers(sheet, found)
     written_with = signed(found.echoes) if seed is None else (level, seed)
     if written_with is None:
-        raise BadInput("--answers: give --questions, or the --seed and --level that they were written with")
+        raise BadInput(
+            "--answers: give --questions, or the --seed and --level that they were written with"
+        )
     return grade_answers(Sheet(*written_with), found)

@@ -1,4 +1,7 @@
-"""`mushrooms draw`: a table through its cycle, and what particles do in it; the export of a trajectory."""
+"""`mushrooms draw`: a table through its cycle, and what particles do in it.
+
+The export of a trajectory.
+"""
 
 from dataclasses import dataclass
 from functools import partial
@@ -18,14 +21,12 @@ from mushrooms.store.run import is_run, open_run
 from scene import BadInput, Scene, Stem
 from scene.files.tables import SUFFIXES
 from scene.files.writer import write_file
-from scene.laws import bounds
 from scene.named import is_scene, scene_named
 from scene.refusal import refuse_unheeded
-from scene.tables import laws
 
 
 class Usual(NamedTuple):
-    """What a picture takes when nothing is asked: particles, crossings of the table a cycle, the end."""
+    """What a picture takes if nothing is asked: particles, crossings in a cycle, the end."""
 
     n_orbits: int
     crossings: float
@@ -92,7 +93,9 @@ class DrawOptions:
         names = ("energy", "collisions", "cycles", "particles", "seed", "phase")
         return {f"--{name}": getattr(self, name) for name in names}
 
-    def follow(self, scene: Scene, kind: str, n_orbits: int | None = None) -> list[orbits.FollowedOrbit]:
+    def follow(
+        self, scene: Scene, kind: str, n_orbits: int | None = None
+    ) -> list[orbits.FollowedOrbit]:
         """Return the orbits for a kind of picture."""
         usual = usual_of(kind, scene, self.phase)
         n_cycles = self.cycles or (None if self.collisions else usual.n_cycles)
@@ -118,7 +121,10 @@ def usual_of(kind: str, scene: Scene, phase: float | None) -> Usual:
 
 
 def draw_scene(options: DrawOptions) -> None:
-    """Draw pictures of a scene, or of a stored run, and export a trajectory; print the names of the files."""
+    """Draw pictures of a scene, or of a stored run, and export a trajectory.
+
+    Print the names of the files.
+    """
     name = options.scene
     out = options.out
     export = options.export
@@ -150,7 +156,9 @@ def _check_heeded(options: DrawOptions) -> None:
     if "section" not in kinds:
         refuse_unheeded({"--phase": options.phase}, "it is of --section")
     if kinds == ["growth"] and options.particles != 1:
-        refuse_unheeded({"--collisions": options.collisions}, "the growth of many goes through --cycles")
+        refuse_unheeded(
+            {"--collisions": options.collisions}, "the growth of many goes through --cycles"
+        )
     if not kinds and options.export is None:
         refuse_unheeded(options.of_particles(), "the picture of the walls has no particles")
 
@@ -170,7 +178,9 @@ def _paths(scene: Scene, out: Path, kinds: list[str]) -> dict[str, Path]:
     Raises:
         BadInput: one of them cannot be drawn, or not written, or does not move and is to be a .gif.
     """
-    found = {f"scene.{name}": bounds(law).highest for name, law in laws(scene).items() if name != "slope"}
+    found = {
+        f"scene.{name}": law.bounds().highest for name, law in scene.laws.items() if name != "slope"
+    }
     found |= {"period": scene.period} if scene.period else {}
     for name, size in found.items():  # squares and sums of them are in a figure
         if not LEAST_DRAWN <= size <= 1 / LEAST_DRAWN:

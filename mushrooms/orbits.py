@@ -30,7 +30,6 @@ from mushrooms.folders import check_file
 from scene import Outcome, Scene, State, Stem, Wall, check_scene
 from scene.files.tables import SUFFIXES, write_table
 from scene.geometry import TableAt, table_at
-from scene.laws import is_constant, values
 from scene.mouth import start_time
 from scene.pieces import FloatArray
 from scene.refusal import BadInput, check_count, check_number, check_seed
@@ -144,7 +143,7 @@ class FollowedOrbit:
             times = self.instants(phase)
             last = np.searchsorted(self.states()[:, 0], times, side="right") - 1
             return np.column_stack([self.at(times)[:, 1], self.states()[last, 4]])
-        walls = ("left", "right") if is_constant(self.scene.h) else ("floor",)
+        walls = ("left", "right") if self.scene.laws["h"].is_constant else ("floor",)
         states = self.states()[1:][np.isin(self.walls, walls)]
         speed = states[:, 4] if walls == ("floor",) else np.abs(states[:, 3])
         phases = (states[:, 0] - start_time(self.scene)) / self.scene.period % 1.0
@@ -191,7 +190,7 @@ class FollowedOrbit:
         is_captured = self.captured()[:-1]
         if isinstance(self.scene, Stem):
             raise theory.NotCovered("the theory is of caps and mushrooms: table is stem")
-        rise = np.diff(-2 * np.log(values(self.scene.r, times)))
+        rise = np.diff(-2 * np.log(self.scene.laws["r"].values(times)))
         if isinstance(self.scene, scenes.Mushroom) and not is_captured.all():
             rise = np.where(
                 is_captured, rise, np.diff(theory.chaotic_zone(self.scene, times).log_energy)

@@ -1,6 +1,7 @@
-"""`mushrooms ask`, `attack` and `verify`: single questions, their proved answers, and answers of steppers.
+"""`mushrooms ask`, `attack` and `verify`: single questions, proved answers, answers of steppers.
 
-A question is a case of the test suite, a draw of a family of nasty questions, or a step of a trajectory.
+A question is a case of the test suite, a draw of a family of nasty questions, or a step of a
+trajectory.
 """
 
 import json
@@ -56,7 +57,10 @@ class AskOptions:
 
 
 def ask_case(options: AskOptions) -> int:
-    """Print a question with its answer and rule; ask a stepper too, if one is given; return the exit code."""
+    """Print a question with its answer and rule.
+
+    Ask a stepper too, if one is given; return the exit code.
+    """
     vector = _find(options.case, options.seed)
     transform = Transform() if options.seed is None else draw_transform(vector, options.seed)
     result = _put(options.command, vector, transform) if options.command else None
@@ -92,12 +96,13 @@ def _show(vector: vectors.Vector, transform: Transform) -> None:
     console.print(f"rule       {escape(vector.rule)}")
     console.print(f"source     {escape(vector.source)}")
     if str(transform) != str(type(transform)()):
-        console.print(f"asked      {transform}; certified answers below are of the question as published")
+        console.print(
+            f"asked      {transform}; certified answers below are of the question as published"
+        )
     console.print(f"question   {escape(json.dumps(vectors.request(transform.apply(vector), 0)))}")
     for i, expectation in enumerate(vector.expect):
-        console.print(
-            f"{'certified' if i == 0 else 'or'}  {expectation.outcome} {expectation.reason}".rstrip()
-        )
+        head = "certified" if i == 0 else "or"
+        console.print(f"{head}  {expectation.outcome} {expectation.reason}".rstrip())
         for number, outcome in enumerate(middle(expectation, vector.state), 1):
             console.print(f"  {number:>4}  {escape(format_outcome(msgspec.to_builtins(outcome)))}")
         for begin, end in expectation.stays:
@@ -139,7 +144,7 @@ class AttackOptions:
 
 
 def attack_steppers(options: AttackOptions) -> int:
-    """Ask steppers the questions of one family or of all, print the counts, and return the exit code."""
+    """Ask steppers the questions of one family or of all; print counts, return the exit code."""
     if options.stepper not in STEPPERS:
         raise BadInput(f"--stepper = {options.stepper!r}, must be one of {', '.join(STEPPERS)}")
     family = options.family
@@ -158,12 +163,17 @@ def attack_steppers(options: AttackOptions) -> int:
         )
     _print(tallies)
     if options.json_file is not None:
-        write_file(options.json_file, json.dumps([_row(tally) for tally in tallies], indent=1) + "\n")
+        write_file(
+            options.json_file, json.dumps([_row(tally) for tally in tallies], indent=1) + "\n"
+        )
     return int(any(tally.cases["wrong"] or tally.slowest > SLOWEST for tally in tallies))
 
 
 def count_hits(scene: Scene, state: State, t_end: float) -> dict[str, int] | None:
-    """Return how often the lanes meet each wall up to t_end; None where a flow is undecided or refused."""
+    """Return how often the lanes meet each wall up to t_end.
+
+    None where a flow is undecided or refused.
+    """
     try:
         carried = fast.flow(scene, [state], t_end)
     except BadInput:
@@ -193,11 +203,17 @@ def _row(tally: Any) -> dict[str, Any]:
 
 def _print(tallies: list[Any]) -> None:
     heads = ("cases", "agreed", "undecided", "refused", "open", "wrong", "worst ulps", "slowest s")
-    table = Table(Column("family", no_wrap=True), *heads, title="Attacks: verdicts of all steppers asked")
+    table = Table(
+        Column("family", no_wrap=True), *heads, title="Attacks: verdicts of all steppers asked"
+    )
     for tally in tallies:
         counts = [str(count) for count in tally.counts.values()]
         table.add_row(
-            tally.family, str(tally.n_cases), *counts, f"{tally.worst_ulps:.3g}", f"{tally.slowest:.2f}"
+            tally.family,
+            str(tally.n_cases),
+            *counts,
+            f"{tally.worst_ulps:.3g}",
+            f"{tally.slowest:.2f}",
         )
     print_table(new_console(), table)
     for tally in tallies:
@@ -264,7 +280,10 @@ def verify_file(options: VerifyOptions) -> int:
 def _judge(
     answers: verifier.Answers, report: verifier.Report, is_all: bool
 ) -> tuple[str, dict[str, Any], dict[str, Any]] | None:
-    """Judge steps, print those that do not agree, and return the first false one: place, start, answer."""
+    """Judge steps and print those that do not agree.
+
+    The first false one is returned: place, start, answer.
+    """
     seen = [answers.state]
 
     def remembered() -> Iterator[tuple[str, Any]]:
@@ -298,7 +317,9 @@ def _of_rows(file: Path, label: str, scene: str) -> tuple[dict[str, Any], list[d
         numbers = {name: read_number(place, name, row[name]) for name in FIELDS}
         if states and row["wall"] not in of.walls:
             given = shown(row["wall"]) if row["wall"] else "empty"
-            raise BadInput(f"{place}: wall is {given}, must be the wall that was hit: {', '.join(of.walls)}")
+            raise BadInput(
+                f"{place}: wall is {given}, must be the wall that was hit: {', '.join(of.walls)}"
+            )
         states.append({**numbers, "wall": row["wall"] or None})
     if not states:
         raise BadInput(f"{label}: there is no row")

@@ -1,4 +1,4 @@
-"""`mushrooms scenes` and `theory`: the catalogue, a scene as a file, what theory predicts for one cycle."""
+"""`mushrooms scenes` and `theory`: the catalogue, a scene as a file, theory for one cycle."""
 
 import json
 import math
@@ -138,7 +138,11 @@ def print_prediction(options: TheoryOptions) -> None:
         task = bar.add_task("resolution 1 of two or more", total=100)
 
         def advance(number: int, share: float) -> None:
-            bar.update(task, completed=round(100 * share), description=f"resolution {number} of two or more")
+            bar.update(
+                task,
+                completed=round(100 * share),
+                description=f"resolution {number} of two or more",
+            )
 
         predicted = theory.predict(found, options.digits, progress=advance)
     pairs: dict[str, Any] = dict(predicted.strings(options.digits))
@@ -148,7 +152,10 @@ def print_prediction(options: TheoryOptions) -> None:
 
 
 def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
-    """Return the figures of one cycle at an initial energy; where there are none, say why on stderr."""
+    """Return the figures of one cycle at an initial energy.
+
+    Where there are none, say why on stderr.
+    """
     speed = math.sqrt(2 * energy)
     n_collisions = expected_collisions(scene, energy, 1)
     first: dict[str, float | bool | None] = {
@@ -176,5 +183,7 @@ def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
         "peak_width_error": variance**0.5 * left.variance / 2,
     }
     digits = {name: 2 if name.endswith("_error") else 7 for name in figures}
-    rounded = {name: x if x is None else float(f"{x:.{digits[name]}g}") for name, x in figures.items()}
+    rounded = {
+        name: x if x is None else float(f"{x:.{digits[name]}g}") for name, x in figures.items()
+    }
     return {**first, **rounded, "is_in_reach": left.variance < 0.5}

@@ -20,7 +20,14 @@ from mushrooms.progress import Watch, announce_compilation, progress_bar
 from mushrooms.store import conduct
 from mushrooms.store.run import StoredRun
 from mushrooms.store.spec import RunSpec
-from mushrooms.store.summary import RunTally, careful_note, explain_limit, gain_of, measured, tally_of
+from mushrooms.store.summary import (
+    RunTally,
+    careful_note,
+    explain_limit,
+    gain_of,
+    measured,
+    tally_of,
+)
 from scene import BadInput
 from scene.files.writer import named, write_file
 from scene.mouth import one_cycle
@@ -30,7 +37,9 @@ from scene.refusal import refuse_unheeded
 Gains = Callable[[], Iterable[Any]]  # returns ln(E/E0) after each cycle, block by block
 MOST_IN_MEMORY = 10**8  # particles
 LIMITED = 3  # exit code of a run that a limit has stopped
-NO_BLOCK = "no block was finished: raise the limit, or begin in another folder with a smaller --block"
+NO_BLOCK = (
+    "no block was finished: raise the limit, or begin in another folder with a smaller --block"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +100,9 @@ def simulate_scene(options: SimulateOptions) -> None:
 def _check_unstored(options: SimulateOptions) -> None:
     """Refuse what only a run in a folder can have."""
     if options.particles > MOST_IN_MEMORY:
-        raise BadInput(f"--particles = {options.particles}, must be 1 to {MOST_IN_MEMORY}; more need --out")
+        raise BadInput(
+            f"--particles = {options.particles}, must be 1 to {MOST_IN_MEMORY}; more need --out"
+        )
     refuse_unheeded(
         {
             "--phases": options.phases,
@@ -131,10 +142,14 @@ def _in_memory(spec: RunSpec, options: SimulateOptions) -> tuple[dict[str, Any],
     with np.errstate(divide="ignore"):
         gains = np.log(found.cycle_energies[found.takes_part()] / spec.energy)
     seconds = found.seconds * found.threads
-    return _summary(spec, tally_of(found), seconds, lambda: [gains], found.sha256()), lambda: [gains]
+    return _summary(spec, tally_of(found), seconds, lambda: [gains], found.sha256()), lambda: [
+        gains
+    ]
 
 
-def _in_folder(folder: Path, spec: RunSpec, options: SimulateOptions) -> tuple[dict[str, Any], Gains]:
+def _in_folder(
+    folder: Path, spec: RunSpec, options: SimulateOptions
+) -> tuple[dict[str, Any], Gains]:
     """Follow an ensemble in a folder that is held meanwhile; return its summary and its gains."""
     threads = options.threads
     engine: conduct.Engine = partial(conduct.in_process, threads=threads)
@@ -144,7 +159,13 @@ def _in_folder(folder: Path, spec: RunSpec, options: SimulateOptions) -> tuple[d
     with writable_folder(folder), locked(folder):
         with named(folder), announce_compilation():
             run = conduct.open_or_create(
-                folder, spec, options.particles, options.block, default, options.scene, options.resume
+                folder,
+                spec,
+                options.particles,
+                options.block,
+                default,
+                options.scene,
+                options.resume,
             )
         complete = partial(
             conduct.complete,
@@ -164,7 +185,9 @@ def _on_disk(
     try:
         with named(run.folder):
             with announce_compilation(), progress_bar() as bar:
-                complete(partial(Watch(bar, name, "particles").update, n_total=run.shape.n_particles))
+                complete(
+                    partial(Watch(bar, name, "particles").update, n_total=run.shape.n_particles)
+                )
             summary = _summary(run.spec, run.tally, run.seconds, run.gains, run.sha256())
     except conduct.LimitReached as limit:
         tell(f"{limit}: {_how_to_resume(run)}")
@@ -188,7 +211,9 @@ def _how_to_resume(run: StoredRun) -> str:
     return f"{kept}; go on with: {run.command}"
 
 
-def _summary(spec: RunSpec, tally: RunTally, seconds: float, gains: Gains, sha256: str) -> dict[str, Any]:
+def _summary(
+    spec: RunSpec, tally: RunTally, seconds: float, gains: Gains, sha256: str
+) -> dict[str, Any]:
     flown = tally.followed * spec.n_cycles * one_cycle(spec.scene)
     return {
         "particles": tally.particles,
@@ -210,7 +235,7 @@ def tell(note: str | None) -> None:
 
 
 def draw_energies(path: Path, spec: RunSpec, gains: Iterator[Any], n_particles: int) -> None:
-    """Write the histogram of ln(E1/E0) of those that take part; of several cycles the mean after each, too.
+    """Write the histogram of ln(E1/E0) of those that take part, and means by cycle if several.
 
     Raises:
         BadInput: they are too few.

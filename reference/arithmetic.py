@@ -69,7 +69,8 @@ class Enclosure(NamedTuple):
 
     def __repr__(self) -> str:
         """Return the centre with its known decimals, and the greatest distance of the true number from it."""
-        centre, half = self.centre(), self.extent() / 2
+        centre = self.centre()
+        half = self.extent() / 2
         if not half and Fraction(float(self)) == centre:
             return f"Enclosure({float(self)!r})"
         half = half or abs(centre) * Fraction("1E-40")
@@ -98,8 +99,7 @@ class Enclosure(NamedTuple):
 
 def rational(number: raw.Raw) -> Fraction:
     """Return the rational that a raw finite number stands for."""
-    numerator, denominator = raw.to_rational(number)
-    return Fraction(int(numerator), int(denominator))
+    return Fraction(*map(int, raw.to_rational(number)))
 
 
 def exact_number(number: raw.Raw) -> ExactMpf:
@@ -242,13 +242,11 @@ class Arithmetic:
 
     def _pi(self, bits: int) -> Interval:
         with CONSTANTS:
-            low, high = raw.pi(bits, raw.DOWN), raw.pi(bits, raw.UP)
-        return self.context.make_mpf((low, high))
+            return self.context.make_mpf((raw.pi(bits, raw.DOWN), raw.pi(bits, raw.UP)))
 
     def enclosure(self, x: Interval) -> Enclosure:
         """Return the ends as exact numbers, free of this context."""
-        lo, hi = raw.ends(x)
-        return Enclosure(exact_number(lo), exact_number(hi))
+        return Enclosure(*map(exact_number, raw.ends(x)))
 
 
 def sign(x: Interval) -> int:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from reference import rational
 from reference.arithmetic import Exhausted, Interval, Undecidable, exact_ends, is_below, sign
 from reference.isolation import Isolator
-from reference.prepared import Prepared
+from reference.prepared import PreparedTable
 from reference.walls import MovingWalls
 from scene import State, Undefined, Wall
 from scene.mpmath_internals import ends
@@ -49,7 +49,7 @@ class Course:
         exact: the state as binary64 numbers, when it is one; decides ties.
     """
 
-    table: Prepared
+    table: PreparedTable
     motion: MovingWalls
     leaving: dict[Wall, Interval]
     is_flat: bool
@@ -59,7 +59,8 @@ class Course:
 
     def __post_init__(self) -> None:
         """Enclose the horizon and the start; nothing is proved yet."""
-        self.arithmetic, self.flight = self.motion.arithmetic, self.motion.flight
+        self.arithmetic = self.motion.arithmetic
+        self.flight = self.motion.flight
         self.horizon = self.arithmetic.dyadic(Fraction(FOR_EVER) if self.end is None else self.end)
         self.start = self.arithmetic.lower(self.flight.begin)
         self._searches: dict[Wall, Isolator] = {}
@@ -181,7 +182,9 @@ class Course:
         hits: list[Hit] = []
         postponed: list[Wall]
         for stop in self._stops(start, self.horizon if limit is None else limit):
-            until, hits, postponed = stop, [], []
+            until = stop
+            hits = []
+            postponed = []
             for wall in itertools.chain(walls, postponed):
                 try:
                     hit = self._hit(wall, start, until, self._searches)
@@ -201,7 +204,9 @@ class Course:
     def _stops(self, start: Interval, until: Interval) -> Iterator[Interval]:
         """Yield later and later ends of a search, first after one period: an early hit stays cheap."""
         upper = self.arithmetic.upper
-        farthest, last, length = self._escape_time(), upper(until), self.motion.timeline.turn
+        farthest = self._escape_time()
+        last = upper(until)
+        length = self.motion.timeline.turn
         if farthest is not None and is_below(farthest, last):
             last = farthest
         while length is not None and is_below(upper(start + length), last):
@@ -301,13 +306,16 @@ class Course:
 
     def _is_never_met(self, wall: Wall, s: Interval) -> bool:
         """Tell whether a wall never comes, in a whole period, to where the flight is at s."""
-        turn, motion = self.motion.timeline.turn, self.motion.at_rest(s)
+        turn = self.motion.timeline.turn
+        motion = self.motion.at_rest(s)
         if turn is None:
             return False
         place = wall, ends(motion.flight.x), ends(motion.flight.y)
         if place not in self._never_met:
-            arithmetic, start = self.arithmetic, self.arithmetic.zero
-            jet, before = partial(motion.wall, wall), arithmetic.number(-1)
+            arithmetic = self.arithmetic
+            start = self.arithmetic.zero
+            jet = partial(motion.wall, wall)
+            before = arithmetic.number(-1)
             search = Isolator(arithmetic, jet, before, self.leaving.get(wall), timeline=self.motion.timeline)
             try:
                 is_clear = sign(search.value(start)) > 0 and search.first_fall(start, turn) is None

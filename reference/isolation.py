@@ -107,7 +107,8 @@ class Isolator:
         Raises:
             Undecidable: when this precision cannot tell.
         """
-        todo, n_parts = [(start, end)], 0
+        todo = [(start, end)]
+        n_parts = 0
         while todo:
             a, b = todo.pop()
             n_parts += 1
@@ -120,7 +121,8 @@ class Isolator:
                 jet = self._expanded(whole, jet)
                 is_excluded = self._is_excluded(a, b, jet)
             if is_excluded or self._is_never_reached(a, b):
-                self.reached, self.n_excluded = b, self.n_excluded + 1
+                self.reached = b
+                self.n_excluded += 1
                 continue
             if sign(jet.d1) < 0 and not self._may_begin(a) and sign(self.value(b)) < 0:
                 return a, b
@@ -134,7 +136,8 @@ class Isolator:
         jet = self.jet(whole)
         if sign(jet.d1) != 0 or sign(jet.d2) == 0:
             return jet
-        first, last = self.jet(a).d1, self.jet(b).d1
+        first = self.jet(a).d1
+        last = self.jet(b).d1
         return jet._replace(d1=self.arithmetic.intersection(jet.d1, self.arithmetic.union([first, last])))
 
     def _expanded(self, whole: Interval, jet: Jet) -> Jet:
@@ -143,8 +146,10 @@ class Isolator:
         Near a flat minimum of a law its waves cancel. Evaluated directly, the error of f is then proportional
         to the length of the interval; this way it is proportional to the cube of the length.
         """
-        arithmetic, middle = self.arithmetic, self.arithmetic.middle(whole)
-        there, away = self.jet(middle), whole - middle
+        arithmetic = self.arithmetic
+        middle = self.arithmetic.middle(whole)
+        there = self.jet(middle)
+        away = whole - middle
         d1 = arithmetic.intersection(jet.d1, there.d1 + jet.d2 * away)
         f = there.f + there.d1 * away + jet.d2 * arithmetic.square(away) / 2
         return jet._replace(f=arithmetic.intersection(jet.f, f), d1=d1)
@@ -186,7 +191,8 @@ class Isolator:
 
     def _is_never_reached(self, a: Interval, b: Interval) -> bool:
         """Tell whether the wall never comes, over at least a period, to where the flight is at a nor at b."""
-        ask, length = self.is_never_met, exact_ends(b)[0] - exact_ends(a)[0]
+        ask = self.is_never_met
+        length = exact_ends(b)[0] - exact_ends(a)[0]
         if ask is None or self._may_begin(a) or not self.timeline.is_whole(length):
             return False
         return ask(b) and ask(a)
@@ -209,7 +215,8 @@ class Isolator:
         """
         where = whole
         for _ in range(MAX_NEWTON):
-            there, over = self.jet(self.arithmetic.middle(where)), self.jet(where)
+            there = self.jet(self.arithmetic.middle(where))
+            over = self.jet(where)
             image = self.arithmetic.middle(where) - there.d1 / over.d2
             if is_below(image, where) or is_below(where, image):
                 break
@@ -273,7 +280,8 @@ class Isolator:
 
         The root may lie half way, at a knot say, however wide the enclosure is; then not at a quarter.
         """
-        lower, upper = self.arithmetic.lower(time), self.arithmetic.upper(time)
+        lower = self.arithmetic.lower(time)
+        upper = self.arithmetic.upper(time)
         if sign(f) == 0:
             middle = self.arithmetic.middle(self.arithmetic.hull(lower, middle))
             f = self.value(middle)
@@ -295,7 +303,8 @@ class Isolator:
             wider = self.arithmetic.hull(
                 self.arithmetic.lower(time - margin), self.arithmetic.upper(time + margin)
             )
-            lower, upper = self.arithmetic.lower(wider), self.arithmetic.upper(wider)
+            lower = self.arithmetic.lower(wider)
+            upper = self.arithmetic.upper(wider)
             slope = self.jet(wider).d1
             is_later = is_below(a, lower) and is_below(self.arithmetic.upper(self.begin), lower)
             if not is_later or sign(slope) >= 0:

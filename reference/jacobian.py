@@ -30,8 +30,11 @@ def step_jacobian(course: Course, hit: Hit) -> Matrix:
     Returns:
         5 rows (outputs) of 5 columns (inputs), intervals.
     """
-    arithmetic, flight, motion = course.arithmetic, course.flight, course.motion
-    s, d = hit.time - flight.begin, hit.slope
+    arithmetic = course.arithmetic
+    flight = course.flight
+    motion = course.motion
+    s = hit.time - flight.begin
+    d = hit.slope
     f_x, f_y, f_t = motion.gradient(hit.wall, hit.time)
     is_met_again = hit.wall in course.leaving
     origin = motion.gradient(hit.wall, flight.begin) if is_met_again else (arithmetic.zero,) * 3
@@ -72,7 +75,8 @@ def _with_near_knot(course: Course, hit: Hit, moves: list[Interval]) -> Interval
         hit: the collision.
         moves: derivatives of the flight time by t, x, y, vx, vy.
     """
-    flight, (low, high) = course.flight, exact_ends(hit.time)
+    flight = course.flight
+    low, high = exact_ends(hit.time)
     begin = course.arithmetic.number(flight.instant)
     sizes = [begin + hit.time, begin]
     sizes += [d * at for d, at in zip(moves, (begin, flight.x, flight.y, flight.vx, flight.vy), strict=True)]

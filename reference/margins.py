@@ -42,7 +42,8 @@ def neighbours(course: Course, wall: Wall) -> tuple[Wall, ...]:
 
 def distance(course: Course, hit: Hit, wall: Wall) -> Interval:
     """Enclose f / |grad f| of a wall at the hit."""
-    motion, arithmetic = course.motion, course.arithmetic
+    motion = course.motion
+    arithmetic = course.arithmetic
     f_x, f_y, _ = motion.gradient(wall, hit.time)
     length = arithmetic.context.sqrt(arithmetic.square(f_x) + arithmetic.square(f_y))
     return motion.wall(wall, hit.time).f / length

@@ -22,7 +22,7 @@ from reference.arithmetic import Arithmetic, Exhausted, Interval, Undecidable, W
 from reference.course import FOR_EVER, Course, Hit
 from reference.jacobian import chained, enclosures, identity, step_jacobian
 from reference.margins import measure
-from reference.prepared import Prepared, prepare
+from reference.prepared import PreparedTable, prepare
 from reference.start import depart
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import (
@@ -161,7 +161,8 @@ def require_digits(found: ProvedCollision, digits: int) -> None:
     Raises:
         Undecidable: there are fewer.
     """
-    bound, after = Fraction(1, 10**digits), found.after
+    bound = Fraction(1, 10**digits)
+    after = found.after
     vectors = {"dt": (found.dt,), "velocity": (after.vx, after.vy), "place": (after.x, after.y)}
     for name, vector in vectors.items():
         size = max(abs(number.centre()) for number in vector)
@@ -173,7 +174,7 @@ def require_digits(found: ProvedCollision, digits: int) -> None:
 
 def _follow(
     arithmetic: Arithmetic,
-    table: Prepared,
+    table: PreparedTable,
     state: State,
     t_end: float | None,
     n_collisions: int,
@@ -201,7 +202,8 @@ def _follow(
     except Undecidable as question:
         if digits is not None:
             raise
-        outcome, jacobian = Undecided(f"{question} ({arithmetic.digits} digits)"), None
+        outcome = Undecided(f"{question} ({arithmetic.digits} digits)")
+        jacobian = None
     return Trajectory(steps, outcome, arithmetic.digits, jacobian)
 
 
@@ -213,7 +215,8 @@ def _extend(
     is_measured: bool,
 ) -> tuple[Outcome | None, Jacobian | None]:
     """Add steps until there are enough, or another outcome comes. Return it, else the Jacobian."""
-    arithmetic, matrix = course.arithmetic, identity(course.arithmetic)
+    arithmetic = course.arithmetic
+    matrix = identity(course.arithmetic)
     while len(steps) < n_collisions:
         hit = course.event()
         if not isinstance(hit, Hit):
@@ -248,7 +251,9 @@ def reflect(course: Course, hit: Hit) -> tuple[Interval, Interval]:
 
 def bounce(course: Course, hit: Hit) -> Bounce:
     """Reflect at a hit, and describe the next flight at an exact instant close to it."""
-    arithmetic, q, s = course.arithmetic, course.flight, hit.time
+    arithmetic = course.arithmetic
+    q = course.flight
+    s = hit.time
     vx, vy = reflect(course, hit)
     is_base = hit.wall == "base"
     x, y = q.x + q.vx * s, arithmetic.zero if is_base else q.y + q.vy * s
@@ -276,7 +281,8 @@ def fly_on(course: Course, hit: Hit, after: Bounce) -> Course:
 
 def collision(course: Course, hit: Hit, after: Bounce) -> ProvedCollision:
     """Return a collision free of its working precision."""
-    arithmetic, flight = course.arithmetic, course.flight
+    arithmetic = course.arithmetic
+    flight = course.flight
     close = arithmetic.enclosure
     return ProvedCollision(
         hit.wall,
@@ -297,7 +303,8 @@ def arrived(arithmetic: Arithmetic, state: State) -> ProvedHorizon:
 
 def horizon(course: Course) -> ProvedHorizon:
     """Return the state at a horizon that no collision comes before."""
-    arithmetic, flight = course.arithmetic, course.flight
+    arithmetic = course.arithmetic
+    flight = course.flight
     end = Fraction(FOR_EVER) if course.end is None else course.end
     s = arithmetic.dyadic(end)
     t = arithmetic.dyadic(flight.instant + end)

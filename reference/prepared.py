@@ -15,7 +15,7 @@ from scene.pieces import Period
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class PreparedTable:
     """A table, its laws, and how large it ever is.
 
     Attributes:
@@ -48,7 +48,7 @@ class Prepared:
 
 
 @lru_cache(maxsize=256)
-def prepare(scene: Scene) -> Prepared:
+def prepare(scene: Scene) -> PreparedTable:
     """Prepare a scene, or find it as it was prepared before.
 
     Args:
@@ -57,7 +57,7 @@ def prepare(scene: Scene) -> Prepared:
     bounds = {name: law.bounds() for name, law in scene.laws.items()}
     nothing = Bounds(0.0, 0.0, 0.0, 0.0)
     slope = bounds.get("slope", nothing)
-    return Prepared(
+    return PreparedTable(
         given=scene,
         is_cap=isinstance(scene, Cap),
         is_stem=isinstance(scene, Stem),

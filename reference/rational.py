@@ -21,7 +21,7 @@ from math import lcm
 from typing import NamedTuple
 
 from reference.jets import Jet, multiply
-from reference.prepared import Prepared
+from reference.prepared import PreparedTable
 from reference.walls import wall_function
 from scene import Law, State, Wall
 
@@ -148,9 +148,11 @@ def _rational_jet(f: Fraction, d1: Fraction = Fraction(0), d2: Fraction = Fracti
     return Jet(exact(f), exact(d1), exact(d2))
 
 
-def wall_jet(table: Prepared, state: State, wall: Wall, s: Fraction) -> Jet:
+def wall_jet(table: PreparedTable, state: State, wall: Wall, s: Fraction) -> Jet:
     """Return f, f', f'' of a wall at flight time s, exactly."""
-    time, vx, vy = Fraction(state.t) + s, Fraction(state.vx), Fraction(state.vy)
+    time = Fraction(state.t) + s
+    vx = Fraction(state.vx)
+    vy = Fraction(state.vy)
     x = _rational_jet(Fraction(state.x) + vx * s, vx)
     y = _rational_jet(Fraction(state.y) + vy * s, vy)
 
@@ -169,7 +171,7 @@ def crossing_time(state: State) -> Fraction | None:
     return -Fraction(state.y) / Fraction(state.vy)
 
 
-def straight_time(table: Prepared, state: State, wall: Wall) -> Fraction | None:
+def straight_time(table: PreparedTable, state: State, wall: Wall) -> Fraction | None:
     """Return the exact flight time to a straight wall of the stem at rest, when it lies ahead.
 
     A wall that is being left and stands still is not met: None.
@@ -180,11 +182,12 @@ def straight_time(table: Prepared, state: State, wall: Wall) -> Fraction | None:
     if not all(table.laws[name].is_constant for name in moving):
         return None
     jet = wall_jet(table, state, wall, Fraction(0))
-    f, rate = jet.f.fraction(), jet.d1.fraction()
+    f = jet.f.fraction()
+    rate = jet.d1.fraction()
     return -f / rate if f is not None and rate is not None and f > 0 > rate else None
 
 
-def is_zero(table: Prepared, state: State, wall: Wall, s: Fraction) -> bool:
+def is_zero(table: PreparedTable, state: State, wall: Wall, s: Fraction) -> bool:
     """Tell whether f, less its residual f(0) on the wall being left, is known to vanish exactly at s."""
     f: ExactNumber = wall_jet(table, state, wall, s).f
     if wall == state.wall:

@@ -6,7 +6,7 @@ from fractions import Fraction
 from reference import rational
 from reference.arithmetic import Arithmetic, Interval, Undecidable, exact_ends, sign
 from reference.course import SIDES, Course
-from reference.prepared import Prepared
+from reference.prepared import PreparedTable
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import InvalidState, State, Undefined, Wall
 from scene.geometry import placed
@@ -14,7 +14,7 @@ from scene.states import ON_WALL
 
 
 def depart(
-    arithmetic: Arithmetic, table: Prepared, state: State, t_end: Fraction | None
+    arithmetic: Arithmetic, table: PreparedTable, state: State, t_end: Fraction | None
 ) -> Course | Undefined:
     """Judge the starting state; return the flight from it, or why mathematics gives no answer from there.
 
@@ -35,26 +35,29 @@ def depart(
     wall = _wall_left(table, state, motion)
     if isinstance(wall, Undefined):
         return wall
-    leaving, is_flat = {}, False
+    leaving = {}
+    is_flat = False
     if wall is not None:
         judged = _judge_rise(table, state, wall, motion)
         if isinstance(judged, Undefined):
             return judged
-        leaving, is_flat = {wall: motion.wall(wall, arithmetic.zero).f}, judged
+        leaving = {wall: motion.wall(wall, arithmetic.zero).f}
+        is_flat = judged
     # New walls without cached values: the work of the flight then does not depend on the start.
-    motion, in_cap = motion_at(table, state, arithmetic), _is_in_cap(table, state, leaving)
+    motion = motion_at(table, state, arithmetic)
+    in_cap = _is_in_cap(table, state, leaving)
     end = None if t_end is None else t_end - motion.flight.instant
     return Course(table, motion, leaving, is_flat, in_cap, end, state)
 
 
-def motion_at(table: Prepared, state: State, arithmetic: Arithmetic) -> MovingWalls:
+def motion_at(table: PreparedTable, state: State, arithmetic: Arithmetic) -> MovingWalls:
     """Return the walls along the flight from a state."""
     numbers = (arithmetic.number(v) for v in (state.x, state.y, state.vx, state.vy))
     flight = EnclosedFlight._make((Fraction(state.t), *numbers, arithmetic.zero))
     return MovingWalls(arithmetic, table, flight)
 
 
-def _is_in_cap(table: Prepared, state: State, leaving: dict[Wall, Interval]) -> bool:
+def _is_in_cap(table: PreparedTable, state: State, leaving: dict[Wall, Interval]) -> bool:
     if not table.is_mushroom:
         return table.is_cap
     if "arc" in leaving or "base" in leaving:
@@ -63,7 +66,7 @@ def _is_in_cap(table: Prepared, state: State, leaving: dict[Wall, Interval]) -> 
     return state.y > 0 or is_rising_in_mouth
 
 
-def _wall_left(table: Prepared, state: State, motion: MovingWalls) -> Wall | Undefined | None:
+def _wall_left(table: PreparedTable, state: State, motion: MovingWalls) -> Wall | Undefined | None:
     """Find the wall that a state leaves, None for none; a place on two walls is undefined."""
     if _is_beside_mouth(table, state, motion):
         return _judge_on_base(table, state, motion)
@@ -78,7 +81,7 @@ def _wall_left(table: Prepared, state: State, motion: MovingWalls) -> Wall | Und
     return on[0] if on else None
 
 
-def _check_part(table: Prepared, state: State) -> None:
+def _check_part(table: PreparedTable, state: State) -> None:
     """Refuse a mushroom's arc below y = 0 and its stem's walls above."""
     if not table.is_mushroom:
         return
@@ -88,7 +91,7 @@ def _check_part(table: Prepared, state: State) -> None:
         raise InvalidState(f"state.y = {state.y!r} on wall {state.wall} is above the stem, must be <= 0")
 
 
-def _walls_near(table: Prepared, state: State) -> list[Wall]:
+def _walls_near(table: PreparedTable, state: State) -> list[Wall]:
     """List the walls that bound the state's part of the table; in a mushroom the arc ends at the base."""
     if table.is_cap:
         return ["base", "arc"]
@@ -99,7 +102,7 @@ def _walls_near(table: Prepared, state: State) -> list[Wall]:
     return ["arc"] if state.y > 0 or state.wall in ("arc", "base") else list(SIDES)
 
 
-def _is_on(table: Prepared, state: State, wall: Wall, motion: MovingWalls) -> bool:
+def _is_on(table: PreparedTable, state: State, wall: Wall, motion: MovingWalls) -> bool:
     """Tell whether an unnamed wall passes exactly through the state; refuse a state beyond it."""
     if wall == state.wall:
         return False
@@ -111,7 +114,7 @@ def _is_on(table: Prepared, state: State, wall: Wall, motion: MovingWalls) -> bo
     return side == 0
 
 
-def _judge_on_base(table: Prepared, state: State, motion: MovingWalls) -> Undefined | None:
+def _judge_on_base(table: PreparedTable, state: State, motion: MovingWalls) -> Undefined | None:
     """Judge a state on y = 0 that names no wall and is beyond the mouth's edge: it is on the base.
 
     The base ends at the arc. If the sign of the arc's f is open, the state may lie outside.
@@ -123,14 +126,14 @@ def _judge_on_base(table: Prepared, state: State, motion: MovingWalls) -> Undefi
     return Undefined("sliding") if state.vy == 0 else None
 
 
-def _is_beside_mouth(table: Prepared, state: State, motion: MovingWalls) -> bool:
+def _is_beside_mouth(table: PreparedTable, state: State, motion: MovingWalls) -> bool:
     """Tell whether a state that names no wall lies on y = 0 beyond the mouth's edge."""
     if not table.is_mushroom or state.wall is not None or state.y != 0:
         return False
     return any(sign(motion.wall(wall, motion.arithmetic.zero).f) < 0 for wall in ("left", "right"))
 
 
-def _judge_rise(table: Prepared, state: State, wall: Wall, motion: MovingWalls) -> Undefined | bool:
+def _judge_rise(table: PreparedTable, state: State, wall: Wall, motion: MovingWalls) -> Undefined | bool:
     """Judge f' at the start on a wall: True if f' = 0 and f'' > 0, False if f' > 0."""
     jet = motion.wall(wall, motion.arithmetic.zero)
     rise = sign(jet.d1)
@@ -151,9 +154,10 @@ def _judge_rise(table: Prepared, state: State, wall: Wall, motion: MovingWalls) 
     return Undefined("sliding" if bend < 0 or is_at_rest or wall == "base" else "tangency")
 
 
-def _check_residual(table: Prepared, state: State, motion: MovingWalls) -> None:
+def _check_residual(table: PreparedTable, state: State, motion: MovingWalls) -> None:
     """Refuse a state too far from the wall it names, as measured by that wall's present size."""
-    wall, zero = state.wall, motion.arithmetic.zero
+    wall = state.wall
+    zero = motion.arithmetic.zero
     assert wall is not None
     size = _distance_of(table, wall, motion)
     gap = motion.wall(wall, zero).f
@@ -173,7 +177,7 @@ def _check_residual(table: Prepared, state: State, motion: MovingWalls) -> None:
     raise InvalidState(f"state.wall = {wall!r}, but the state is {shown:.3g} away from that wall")
 
 
-def _distance_of(table: Prepared, wall: Wall, motion: MovingWalls) -> Interval:
+def _distance_of(table: PreparedTable, wall: Wall, motion: MovingWalls) -> Interval:
     """Return r for the arc, w for a side, h for the floor, the larger of r and w for the base, now."""
     zero = motion.arithmetic.zero
     if wall == "floor":

@@ -24,14 +24,16 @@ from typing import Any
 
 from reference.arithmetic import Arithmetic, Interval, exact_ends, is_below, sign
 from reference.jets import Jet, united
-from reference.prepared import Prepared
+from reference.prepared import PreparedTable
 from scene import BangBang, Fourier, Law
 from scene.mpmath_internals import ends
 from scene.pieces import PolynomialPiece
 
 ORDER = 8
 # In evaluations of a parabola, as measured: a wave; an expansion, and a wave of it.
-WORK_OF_A_WAVE, WORK_OF_AN_EXPANSION, WORK_OF_AN_EXPANDED_WAVE = 1.5, 4, 2
+WORK_OF_A_WAVE = 1.5
+WORK_OF_AN_EXPANSION = 4
+WORK_OF_AN_EXPANDED_WAVE = 2
 
 
 class Timeline:
@@ -43,7 +45,7 @@ class Timeline:
         instant: the absolute time from which times are counted [time].
     """
 
-    def __init__(self, arithmetic: Arithmetic, table: Prepared, instant: Fraction) -> None:
+    def __init__(self, arithmetic: Arithmetic, table: PreparedTable, instant: Fraction) -> None:
         self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in table.laws.items()}
         length = None if table.cycle is None else table.cycle.value(arithmetic.context)
         self.turn = None if length is None else arithmetic.upper(length)  # a period at least
@@ -198,7 +200,9 @@ class Waves:
     def _summed(self, s: Interval) -> Jet:
         """Sum the harmonics and their derivatives."""
         self.arithmetic.spend(WORK_OF_A_WAVE * len(self.terms))
-        f, d1, d2 = self.mean, self.arithmetic.zero, self.arithmetic.zero
+        f = self.mean
+        d1 = self.arithmetic.zero
+        d2 = self.arithmetic.zero
         for frequency, wave, quadrature in self._waves(s):
             f = f + wave
             d1 = d1 + frequency * quadrature
@@ -225,7 +229,9 @@ class Waves:
 
     def _waves(self, s: Interval) -> list[tuple[Interval, Interval, Interval]]:
         """Return frequency, value, and rate / frequency of each wave k."""
-        found, phase, zero = [], self.phase + self.omega * s, self.arithmetic.zero
+        found = []
+        phase = self.phase + self.omega * s
+        zero = self.arithmetic.zero
         for k, frequency, a, b in self.terms:
             cos, sin = self.arithmetic.cos_sin(k * phase)
             wave, quadrature = zero, zero

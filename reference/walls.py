@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from reference.arithmetic import Arithmetic, Interval
 from reference.jets import Jet, add, multiply, negative, square
-from reference.prepared import Prepared
+from reference.prepared import PreparedTable
 from reference.timeline import Timeline
 from scene import Wall
 from scene.mpmath_internals import ends
@@ -40,7 +40,7 @@ class EnclosedFlight(NamedTuple):
 
 
 def wall_function(
-    table: Prepared,
+    table: PreparedTable,
     wall: Wall,
     x: Jet,
     y: Jet,
@@ -70,7 +70,7 @@ def wall_function(
 class MovingWalls:
     """Evaluates the walls along a flight."""
 
-    def __init__(self, arithmetic: Arithmetic, table: Prepared, flight: EnclosedFlight) -> None:
+    def __init__(self, arithmetic: Arithmetic, table: PreparedTable, flight: EnclosedFlight) -> None:
         self.arithmetic = arithmetic
         self.flight = flight
         self.table = table
@@ -80,7 +80,9 @@ class MovingWalls:
 
     def at_rest(self, s: Interval) -> MovingWalls:
         """Return the walls for a particle at rest where the flight is at s. Evaluated laws are shared."""
-        q, zero, still = self.flight, self.arithmetic.zero, copy(self)
+        q = self.flight
+        zero = self.arithmetic.zero
+        still = copy(self)
         still.flight = q._replace(x=q.x + q.vx * s, y=q.y + q.vy * s, vx=zero, vy=zero)
         still._known = {}
         return still
@@ -103,7 +105,8 @@ class MovingWalls:
         return self._known[key]
 
     def _evaluated(self, wall: Wall, s: Interval) -> Jet:
-        q, zero = self.flight, self.arithmetic.zero
+        q = self.flight
+        zero = self.arithmetic.zero
         x, y = Jet(q.x + q.vx * s, q.vx, zero), Jet(q.y + q.vy * s, q.vy, zero)
 
         def law(name: str) -> Jet:
@@ -113,8 +116,10 @@ class MovingWalls:
 
     def gradient(self, wall: Wall, s: Interval) -> tuple[Interval, Interval, Interval]:
         """Enclose the partial derivatives of f by x, y and t at flight time s."""
-        q, f_t = self.flight, self.at_rest(s).wall(wall, s).d1
-        one, zero = self.arithmetic.number(1), self.arithmetic.zero
+        q = self.flight
+        f_t = self.at_rest(s).wall(wall, s).d1
+        one = self.arithmetic.number(1)
+        zero = self.arithmetic.zero
         if wall == "arc":
             return -2 * (q.x + q.vx * s), -2 * (q.y + q.vy * s), f_t
         if wall in ("left", "right"):
@@ -124,7 +129,8 @@ class MovingWalls:
 
     def hessian(self, wall: Wall, s: Interval) -> tuple[Interval, Interval, Interval, Interval]:
         """Enclose f_xx, f_yy, f_yt and f_tt at flight time s; the other second partials are 0."""
-        f_tt, zero = self.at_rest(s).wall(wall, s).d2, self.arithmetic.zero
+        f_tt = self.at_rest(s).wall(wall, s).d2
+        zero = self.arithmetic.zero
         f_yt = self.law("slope", s).d1 if wall in ("left", "right") else zero
         curved = self.arithmetic.number(-2) if wall == "arc" else zero
         return curved, curved, f_yt, f_tt

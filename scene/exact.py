@@ -103,7 +103,8 @@ def derivative(p: Polynomial) -> Polynomial:
 def at(p: Polynomial, x: Fraction) -> Fraction:
     """Evaluate p at x, exactly: in whole numbers, as fractions would be reduced at every step."""
     common = lcm(*(a.denominator for a in p))
-    total, power = 0, 1
+    total = 0
+    power = 1
     for a in reversed(p):
         total = total * x.numerator + a.numerator * (common // a.denominator) * power
         power *= x.denominator
@@ -125,10 +126,12 @@ def divide(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
     """
     rest, divisor = ([a.numerator for a in _primitive(polynomial)] for polynomial in (p, q))
     quotient = [0] * max(len(rest) - len(divisor) + 1, 0)
-    size, sign = abs(divisor[-1]), 1 if divisor[-1] > 0 else -1
+    size = abs(divisor[-1])
+    sign = 1 if divisor[-1] > 0 else -1
     for shift in reversed(range(len(quotient))):
         factor = sign * rest[shift + len(divisor) - 1]
-        rest, quotient = [size * a for a in rest], [size * a for a in quotient]
+        rest = [size * a for a in rest]
+        quotient = [size * a for a in quotient]
         quotient[shift] = factor
         for i, b in enumerate(divisor):
             rest[shift + i] -= factor * b

@@ -77,7 +77,8 @@ class TableAt(NamedTuple):
 
         The distance is |f| / |grad f|. Beyond the ends of a wall it is larger.
         """
-        above, below = max(0.0, y), max(0.0, -y)
+        above = max(0.0, y)
+        below = max(0.0, -y)
         distances: dict[Wall, float] = {}
         if not isinstance(self.scene, Stem):
             distances["arc"] = abs(self.r - math.hypot(x, y)) + below
@@ -152,7 +153,9 @@ class TableAt(NamedTuple):
             (x, depth), each of shape (n,) [length]; the points are (x, -depth). All 0 in a cap.
         """
         # At depth d the stem is 2 (w - slope d) wide: solve 2 w d - slope d^2 = a area for d.
-        w, slope, area = self.w, self.slope, self.stem_area()
+        w = self.w
+        slope = self.slope
+        area = self.stem_area()
         depth = a * area / (w + np.sqrt(np.maximum(w * w - slope * a * area, 0.0)) + 1e-300)
         return (w - slope * depth) * (2.0 * b - 1.0), depth
 
@@ -204,7 +207,9 @@ def placed(scene: Scene, state: State, wall: Wall, how: str) -> str:
         how: "beyond" or "within rounding of".
     """
     ctx = decimals(DIGITS)
-    table, x, y = table_at(ctx, scene, state.t), ctx.mpf(state.x), ctx.mpf(state.y)
+    table = table_at(ctx, scene, state.t)
+    x = ctx.mpf(state.x)
+    y = ctx.mpf(state.y)
     away = abs(table.gap(wall, x, y)) / (table.r + ctx.hypot(x, y) if wall == "arc" else 1)
     is_after_a_hit = state.wall is None and away <= ON_WALL * table.size
     hint = f": name the wall that is left (state.wall = {wall!r})" if is_after_a_hit else ""

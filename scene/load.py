@@ -106,7 +106,8 @@ def _in_words(error: Exception, data: Any) -> str:
     cause = error.__cause__
     if isinstance(cause, InvalidScene):
         # A law does not know its parameter, so its message names its kind.
-        return re.sub(r"^(fourier|bang-bang)(?=[. ])", place, str(cause)) if place else str(cause)
+        kinds = "|".join(_kinds(place))
+        return re.sub(rf"^({kinds})(?=[. ])", place, str(cause)) if place else str(cause)
     tags = ", ".join(_kinds(place.removeprefix("table")))
     if place in ("table", *(f"{name}.kind" for name in PARAMETERS)):
         return f"{place} = {shown(_at(data, names))}, must be one of {tags}"
@@ -177,7 +178,8 @@ def json_schema() -> dict[str, Any]:
 
 def limit_definitions(definitions: dict[str, Any]) -> None:
     """Put what a schema can say of the rules for scenes (`scene.protocol.rules`) into its definitions."""
-    fourier, knots = definitions["Fourier"], definitions["BangBang"]["properties"]["knots"]
+    fourier = definitions["Fourier"]
+    knots = definitions["BangBang"]["properties"]["knots"]
     for field in ("omega", "period"):
         fourier["properties"][field] = {"type": "number", "exclusiveMinimum": 0}
     fourier["oneOf"] = [{"required": ["omega"]}, {"required": ["period"]}]

@@ -108,7 +108,8 @@ def _slope(w: FloatArray, r: FloatArray) -> FloatArray:
 
 def _zeros(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
     """Return N's zeros, by Chebyshev series between neighbouring cuts."""
-    middle, half = 0.5 * (cuts[1:] + cuts[:-1]), 0.5 * np.diff(cuts)
+    middle = 0.5 * (cuts[1:] + cuts[:-1])
+    half = 0.5 * np.diff(cuts)
     places = middle[:, None] + half[:, None] * NODES
     series = _slope(w(places), r(places))[0] @ TO_SERIES
     sizes = np.abs(series)
@@ -129,33 +130,41 @@ def _zeros(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
 
 def _minima(w: Motion, r: Motion, phases: FloatArray) -> list[float]:
     """Return where nu is least in each of its valleys; it is monotone between neighbours among `phases`."""
-    at_w, at_r = w(phases), r(phases)
-    nu, slope = at_w[0] / at_r[0], np.abs(_slope(at_w, at_r)[0])
+    at_w = w(phases)
+    at_r = r(phases)
+    nu = at_w[0] / at_r[0]
+    slope = np.abs(_slope(at_w, at_r)[0])
     top = int(np.argmax(nu))
     small = SWING * nu[top]
     # Once round from the highest place to itself.
     order = np.append(np.arange(top, top + len(nu)), top) % len(nu)
     u = np.append(phases[order[:-1]] + (order[:-1] < top), phases[top] + 1.0)
     found: list[float] = []
-    is_falling, extreme, begin = True, nu[top], 0
+    is_falling = True
+    extreme = nu[top]
+    begin = 0
     for k, level in enumerate(nu[order]):
         if is_falling:
             extreme = min(extreme, level)
             if level > extreme + small:
                 low = [i for i in range(begin, k) if nu[order[i]] <= extreme + small]
                 found.append(_lowest(w, r, u[low], slope[order[low]]))
-                is_falling, extreme = False, level
+                is_falling = False
+                extreme = level
         else:
             extreme = max(extreme, level)
             if level < extreme - small:
-                is_falling, extreme, begin = True, level, k
+                is_falling = True
+                extreme = level
+                begin = k
     return found
 
 
 def _lowest(w: Motion, r: Motion, u: FloatArray, slope: FloatArray) -> float:
     """Return the middle of a plateau, else the place of least slope, of places equal within rounding."""
     middle = np.array([0.5 * (u[0] + u[-1])])
-    at_w, at_r = w(middle % 1.0), r(middle % 1.0)
+    at_w = w(middle % 1.0)
+    at_r = r(middle % 1.0)
     terms = np.abs(at_w[1] * at_r[0]) + np.abs(at_w[0] * at_r[1])
     is_plateau = np.abs(_slope(at_w, at_r)[0]) <= SWING * terms
     return float(middle[0]) if is_plateau else float(u[np.argmin(slope)])

@@ -19,7 +19,9 @@ __all__ = ["MPIntervalContext"]  # a system of intervals, of which mpmath itself
 
 Raw = Any  # sign, mantissa, exponent, and bits of the mantissa; infinities and nan look otherwise
 RawInterval = tuple[Raw, Raw]
-DOWN, UP, NEAREST = "f", "c", "n"  # to round
+DOWN = "f"  # to round
+UP = "c"
+NEAREST = "n"
 
 number: Callable[[Any], Raw] = attrgetter("_mpf_")
 ends: Callable[[Any], RawInterval] = attrgetter("_mpi_")

@@ -32,6 +32,7 @@ from scene.refusal import BadInput, InvalidScene, check_number, listed, shown
 from scene.validity import Condition, prove
 
 Wall = Literal["arc", "base", "left", "right", "floor"]
+KINDS = " or ".join(f"a {kind.__name__}" for kind in WRITTEN)
 PARAMETERS = ("r", "w", "nu", "h", "slope")
 # Controls but tab and line ends, lone surrogates, and what XML has no place for.
 HIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
@@ -64,7 +65,7 @@ class _Table(
             if isinstance(given, WRITTEN):
                 continue
             if isinstance(given, bool) or not isinstance(given, Real):
-                raise InvalidScene(f"{field} = {shown(given)}, must be a number, a Fourier or a BangBang law")
+                raise InvalidScene(f"{field} = {shown(given)}, must be a number, {KINDS} law")
             msgspec.structs.force_setattr(self, field, check_number(field, given, InvalidScene))
         for field in ("name", "notes"):
             _check_text(field, getattr(self, field))

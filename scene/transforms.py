@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from mpmath import fp
 
-from scene.laws import Constant, Fourier, Law, law_of, times_power
+from scene.laws import Constant, Fourier, Law, law_of, times_power as times_power
 from scene.precision import decimals
 from scene.states import State
 from scene.tables import Scene, Wall

@@ -175,17 +175,21 @@ def sign_on_legs(terms: Terms, is_strict: bool, legs: Iterable[tuple[Fraction, F
 def enclose(terms: Terms, m: Fraction, h: Fraction) -> tuple[Interval, Interval]:
     """Enclose the sum of sign * product(laws) at m, and within h of m on the pieces that hold at m."""
     ctx = intervals(BITS)
-    t, away = number(ctx, m), number(ctx, h) * ctx.mpf([-1, 1])
-    total, total_rate = ctx.mpf(0), ctx.mpf(0)
+    t = number(ctx, m)
+    away = number(ctx, h) * ctx.mpf([-1, 1])
+    total = ctx.mpf(0)
+    total_rate = ctx.mpf(0)
     for sign, laws in terms:
-        at_m, rate = ctx.mpf(sign), ctx.mpf(0)
+        at_m = ctx.mpf(sign)
+        rate = ctx.mpf(0)
         for law in laws:
             piece = law.piece_at(m)
             factor = piece.evaluate(ctx, t)
             factor_rate = piece.evaluate(ctx, t + away, 1)
             rate = rate * (factor + away * factor_rate) + (at_m + away * rate) * factor_rate
             at_m = at_m * factor
-        total, total_rate = total + at_m, total_rate + rate
+        total = total + at_m
+        total_rate = total_rate + rate
     return total, total + away * total_rate
 
 

@@ -1,5 +1,6 @@
 """Parts of the checks, one by one: what is drawn, and what is said of answers that are given by hand."""
 
+import json
 import math
 import re
 from types import SimpleNamespace
@@ -7,17 +8,29 @@ from typing import Any
 
 import msgspec
 import pytest
+from mpmath import fp
+from support.faulty_steppers import faulty
 
 from conformance.cases.draw import Draw
 from conformance.profiles import margin
 from conformance.suite import pytest_plugin
-from conformance.suite.checks import bad_input, flows, form, path_judge, spelling, timing
+from conformance.suite.checks import (
+    bad_input,
+    checks_of,
+    flows,
+    form,
+    path_judge,
+    run_check,
+    spelling,
+    timing,
+)
 from conformance.suite.checks.form import Implementation, octaves
 from conformance.suite.process import CheckFailure
 from conformance.suite.result import graded_parts
+from conformance.suite.session import Session
 from conformance.vectors import Vector, question
-from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, load
-from scene.geometry import area
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, from_data, load
+from scene.geometry import area, table_at
 from scene.laws import bounds
 from scene.protocol.messages import Introduction
 from theory import predict
@@ -69,9 +82,12 @@ AMONG = {
 
 
 @pytest.mark.parametrize("name", AMONG)
-def test_a_state_is_answered_among_others_as_alone(name):
+def test_a_state_is_answered_among_others_as_alone(name, monkeypatch):
     alone, among, said = AMONG[name]
-    side = SimpleNamespace(flown=lambda _, states, __: [alone if len(states) == 1 else among] * len(states))
+    side = Implementation(Session(lambda _: b""), "flow")
+    monkeypatch.setattr(
+        side, "flown", lambda _, states, __: [alone if len(states) == 1 else among] * len(states)
+    )
     if isinstance(said, bool):
         assert flows.together(side, SCENE, [START], [0, 0], 1.0) == said
     else:
@@ -105,9 +121,11 @@ PATHS = [
 
 
 @pytest.mark.parametrize(("steps", "n", "said"), PATHS, ids=range(len(PATHS)))
-def test_a_path_has_as_many_steps_as_asked_for_or_ends(steps, n, said):
+def test_a_path_has_as_many_steps_as_asked_for_or_ends(steps, n, said, monkeypatch):
     """A stepper whose steps go on without end is refused, and so is one that stops short."""
-    side = Implementation(SimpleNamespace(ask=lambda _: {"seq": 0, "steps": steps}), "trajectory")
+    session = Session(lambda _: b"")
+    monkeypatch.setattr(session, "ask", lambda _: {"seq": 0, "steps": steps})
+    side = Implementation(session, "trajectory")
     if said is None:
         assert len(side.path(SCENE, START, n)) == len(steps)
     else:
@@ -348,6 +366,51 @@ def test_states_are_asked_about_up_to_a_time_that_is_near(profile):
     assert ahead == {-1.0} if profile == "trajectory" else {0.0, -(2.0**-6)}
 
 
+@pytest.mark.parametrize("scene", [*bad_input.RESTING, load("moving-cap"), Stem(w=1.0, h=1.25, slope=0.25)])
+def test_places_past_the_end_of_a_wall_are_on_its_curve_and_not_on_it(scene):
+    """As far as a sixteenth of its size and as near as 2^-10; of a mushroom's arc one is within the stem."""
+    table = table_at(fp, scene, 0.0)
+    r, w, h = float(table.r), float(table.w), float(table.h)
+    for wall in scene.walls:
+        places = [
+            place for key in range(8) for place in bad_input._past_the_end(Draw(f"ends/{key}"), table, wall)
+        ]
+        in_stem = [(x, y) for x, y in places if wall == "arc" and y < -0.5 * r]
+        ends = {"arc": r, "base": w if isinstance(scene, Stem) else r}
+        for x, y in places:
+            assert abs(table.gap(wall, x, y)) < 1e-12 * table.size
+            if wall == "arc":
+                assert y < 0
+            elif wall == "base":
+                assert 2.0**-10 < abs(x) / ends[wall] - 1 <= 2.0**-4
+            elif wall == "floor":
+                assert 2.0**-10 < abs(x) / table.half_width(-h) - 1 <= 2.0**-4
+            else:
+                assert 2.0**-10 <= max(y / h, -y / h - 1) <= 2.0**-4
+                assert (x < 0) == (wall == "left")
+        past = [place for place in places if place not in in_stem]
+        assert len(past) >= 8 * 6
+        assert {place[wall in ("left", "right")] > 0 for place in past} == {True, False}
+        is_deep = isinstance(scene, Mushroom) and wall == "arc" and h > r * math.sqrt(1 - w * w / 16)
+        assert len(in_stem) == (8 if is_deep else 0)
+        assert all(abs(x) < table.half_width(y) and -h < y for x, y in in_stem)
+
+
+@pytest.mark.parametrize("scene", [*bad_input.RESTING, Stem(w=2.0, h=1.25, slope=0.25), load("moving-cap")])
+def test_a_place_is_moved_inwards_by_a_part_of_the_walls_size(scene):
+    """That is the radius, for a stem's base and for sides the width, for a floor the depth."""
+    table = table_at(fp, scene, 0.0)
+    for wall in scene.walls:
+        x, y = bad_input._place(Draw(f"place/{wall}"), table, wall)
+        assert abs(table.gap(wall, x, y)) < 1e-12 * table.size
+        size = {"arc": table.r, "base": table.w if isinstance(scene, Stem) else table.r, "floor": table.h}
+        for part in (0.0625, -0.0625):
+            to = bad_input.move_inwards(table, wall, x, y, part)
+            moved = math.hypot(to[0] - x, to[1] - y)
+            assert moved == pytest.approx(0.0625 * float(size.get(wall, max(float(table.w), abs(x)))))
+            assert (table.gap(wall, *to) > 0) == (part > 0)
+
+
 TAGGED = {"type": "object", "properties": {"kind": {"enum": ["wave"]}, "x": {"type": "number"}}}
 TWICE = {"type": "object", "properties": {"kind": {"enum": ["wave"]}, "wall": {"enum": ["arc"]}}}
 FIRST = {"type": "object", "properties": {"kind": {"enum": ["wave", "legs"]}}}
@@ -400,3 +463,77 @@ def test_a_bad_option_of_the_plugin_is_refused_by_its_name(changes, said):
     else:
         with pytest.raises(pytest.UsageError, match=re.escape(said)):
             pytest_plugin.pytest_configure(config)
+
+
+class SlowSession(Session):
+    """A session with a right stepper that takes `pace` seconds for a hit, by a clock that is not waited for.
+
+    A flow is taken to have as many hits as its particles could cross their table.
+    """
+
+    def __init__(self, pace: float) -> None:
+        super().__init__(faulty(lambda request, answer: answer(request)))
+        self.pace = pace
+        self.longest = 0.0
+        self.start()
+
+    def _exchange(self, line: bytes) -> bytes:
+        answer = super()._exchange(line)
+        self.seconds = self.pace * hits_of(json.loads(line), json.loads(answer))
+        if self.seconds > self.limits.timeout:
+            raise CheckFailure("timed-out", f"{self.seconds:g} s")
+        self.longest = max(self.longest, self.seconds)
+        return answer
+
+
+def hits_of(request: dict[str, Any], answer: dict[str, Any]) -> float:
+    if request["cmd"] == "trajectory":
+        return len(answer["steps"])
+    if request["cmd"] != "flow":
+        return 1
+    scene, states = from_data(request["scene"]), [State(**state) for state in request["states"]]
+    flown = [max(0.0, request["t_end"] - state.t) / path_judge.crossing(scene, state) for state in states]
+    return 1 + sum(flown)
+
+
+SLOW = (
+    *(f"promise/{name}" for name in ("long-paths", "long-flow", "many-particles")),
+    f"profile/{flows.PROFILES[0]}",
+)
+
+
+@pytest.mark.parametrize("pace", [0.02, 0.2])
+@pytest.mark.parametrize("name", SLOW)
+def test_a_slow_stepper_is_asked_for_what_it_answers_in_time(name, pace, monkeypatch):
+    """Its paths, flows and ensembles are shorter than those of a fast one, and its result says so."""
+    if name.startswith("profile/"):
+        pace *= 20  # the energies are low
+        monkeypatch.setitem(flows.SIZES, "core", flows.Size(300, 50.0, 0.5))
+    check = next(check for check in checks_of() if check.name == name)
+    with SlowSession(pace) as slow, SlowSession(0.0) as prompt:
+        found, usual = run_check(check, slow, 1), run_check(check, prompt, 1)
+    assert (found.verdict, usual.verdict) == ("pass", "pass"), found.why
+    assert "not asked" not in usual.why
+    assert name.startswith("profile/") or "not asked" in found.why
+    assert slow.longest > slow.limits.timeout / 64
+    assert prompt.n_restarts == slow.n_restarts == 0
+
+
+def test_a_stepper_that_becomes_slow_is_timed_out():
+    """The paths before do not excuse it."""
+
+    class Tired(SlowSession):
+        def _exchange(self, line: bytes) -> bytes:
+            self.pace = 1.0 if json.loads(line).get("collisions", 0) > 2000 else 1e-4
+            return super()._exchange(line)
+
+    check = next(check for check in checks_of() if check.name == "promise/long-paths")
+    with Tired(1e-4) as session:
+        assert run_check(check, session, 1).verdict == "timed-out"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "n"), [(0.0, flows.BATCH), (1e-3, flows.BATCH), (1.0, 30), (7.0, 4), (100.0, 1)]
+)
+def test_an_ensemble_is_cut_by_the_time_of_a_particle(seconds, n):
+    assert flows.batch_size(seconds, 120.0) == n

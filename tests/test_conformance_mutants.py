@@ -1,6 +1,8 @@
 """Every mutant is killed by the vectors that the published kill matrix names for it; plain by none."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -130,3 +132,15 @@ NAMED = [
 def test_a_diagnosis_names_the_mistake(vectors, name):
     said = diagnose(*judged((MUTANTS | COMMON)[name], vectors))
     assert any(line.startswith(f"like {name} on ") for line in said), said
+
+
+@pytest.mark.parametrize("module", ["conformance.mutants.kill_matrix", "conformance.bench.scoreboard"])
+@pytest.mark.parametrize("option", ["--help", "--tabel"])
+def test_an_unknown_option_starts_no_long_run(module, option):
+    """Both write a file of the project after a quarter of an hour."""
+    done = subprocess.run(
+        [sys.executable, "-m", module, option], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"{option!r} is no option: ")
+    assert done.stderr.count("\n") == 1

@@ -25,7 +25,8 @@ from scene.tables import width_factors
 
 def test_blocks_are_parts_of_the_whole():
     """Also in what they would go on from."""
-    scene, asked = load("moving-cap"), {"energy": 300.0, "n_cycles": 2, "seed": 4}
+    scene = load("moving-cap")
+    asked = {"energy": 300.0, "n_cycles": 2, "seed": 4}
     whole = fast.go_on(scene, n_particles=90, **asked)
     for first, n in ((0, 1), (1, 88), (37, 53)):
         part = fast.go_on(scene, n_particles=n, first=first, **asked)
@@ -40,7 +41,8 @@ def test_blocks_are_parts_of_the_whole():
 
 def test_each_cycle_has_its_means_and_their_errors():
     run = fast.simulate(load("moving-cap"), n_particles=400, energy=1e4, n_cycles=3, seed=2)
-    there, s = run.takes_part(), run.s()
+    there = run.takes_part()
+    s = run.s()
     assert np.allclose(s.sum(axis=1), np.log(run.energy / run.energy0), equal_nan=True, rtol=1e-12)
     assert run.m1() == pytest.approx(s[there].mean(axis=0))
     assert run.m1_se() == pytest.approx(s[there].std(axis=0, ddof=1) / there.sum() ** 0.5)
@@ -77,7 +79,8 @@ def test_frozen_table_keeps_energy_and_island():
     run = fast.simulate(load("frozen-mushroom"), n_particles=4000, energy=1e4, seed=2, phases=(0.5,))
     assert np.allclose(run.energy, 1e4, rtol=1e-12)
     delta = 2 / np.pi * (np.arccos(0.5) - 0.5 * np.sqrt(0.75))
-    v_cap, v_stem = np.pi**2, 2 * np.pi * (2 * 0.5 - 0.1111)
+    v_cap = np.pi**2
+    v_stem = 2 * np.pi * (2 * 0.5 - 0.1111)
     share = delta * v_cap / (v_cap + v_stem)
     captured = np.mean(run.phase_captured[:, 0, 0])
     assert captured == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 4000))
@@ -92,7 +95,8 @@ def test_progress_reaches_the_end():
 
 def test_energies_at_phases_are_the_flow_s():
     """At a phase of the cycle an ensemble's particle has the energy that the same start has in a flow."""
-    scene, phases = load("moving-cap"), (0.2, 0.5, 0.9)
+    scene = load("moving-cap")
+    phases = (0.2, 0.5, 0.9)
     run = fast.simulate(scene, n_particles=40, energy=50.0, seed=3, phases=phases)
     starts = [State(t, *place) for t, _, *place in initial_states(scene, 40, 50.0, 3).tolist()]
     assert run.phase_energies.shape == (40, 1, 3)
@@ -102,7 +106,8 @@ def test_energies_at_phases_are_the_flow_s():
         assert run.phase_energies[:, 0, k].tolist() == energies
     assert np.array_equal(run.wall_counts.sum(axis=1), run.n_collisions)
     # Between its capture and its release a particle is captured at each phase looked at.
-    t_in, t_out = run.t_in[:, 0, 0], run.t_out[:, 0, 0]
+    t_in = run.t_in[:, 0, 0]
+    t_out = run.t_out[:, 0, 0]
     inside = (t_in < np.pi) & (np.pi < t_out)
     assert inside.any()
     assert run.phase_captured[inside, 0, 1].all()
@@ -145,13 +150,16 @@ AT_THE_END = Mushroom(r=1.0, h=1.0, nu=Fourier(mean=0.6, omega=1.0, cos=(-0.3,))
 
 def stays_along(scene, start, hits):
     """List the capture intervals (begin, end) of a path by their definition; end = infinity if not over."""
-    found, begin, end = [], math.inf, math.inf
+    found = []
+    begin = math.inf
+    end = math.inf
     vx, vy = start.vx, start.vy
     for wall, (_, t, x, y, *after) in hits:
         if wall == "arc":
             w = math.prod(float(value(fp, law, t)) for law in width_factors(scene))
             if abs(x * vy - y * vx) > w * math.hypot(vx, vy):
-                begin, end = min(begin, t), math.inf
+                begin = min(begin, t)
+                end = math.inf
             elif begin < math.inf:
                 end = min(end, t)
         elif wall != "base":
@@ -182,7 +190,9 @@ CASES = {**MOUTHS, "at the cycle's end": AT_THE_END, "moving-cap": load("moving-
 @pytest.mark.parametrize("name", deep_among(CASES, "equal", "moving-cap"))
 def test_stays_are_those_of_the_definition(name, tally):
     """In the cycles before chaos parts a particle from its trajectory, which other roundings lead."""
-    scene, n, n_cycles = CASES[name], 100, 3
+    scene = CASES[name]
+    n = 100
+    n_cycles = 3
     span = one_cycle(scene)
     energy = 0.5 * (25.0 / span) ** 2
     run = fast.simulate(scene, n_particles=n, energy=energy, n_cycles=n_cycles, seed=3)
@@ -224,7 +234,9 @@ def test_who_is_released_takes_part_though_the_stem_was_not_met(energy):
 @pytest.mark.parametrize("energy", [10.0, 100.0])
 def test_who_takes_no_part_started_beyond_the_widest_mouth(energy):
     """Such particles are never free. The chord of their start misses the mouth at its widest."""
-    scene, n, drift = MOUTHS["equal"], 1000, 0.2 / math.sqrt(energy)
+    scene = MOUTHS["equal"]
+    n = 1000
+    drift = 0.2 / math.sqrt(energy)
     _, _, x, y, vx, vy = initial_states(scene, n, energy, 2).T
     miss = np.where(y > 0, np.abs(x * vy - y * vx) / np.hypot(vx, vy), 0.0)
     for n_cycles in (1, 2):
@@ -244,7 +256,8 @@ def z_score(run, scene):
     return (float(run.p_nc()[0]) - expected) / error, error
 
 
-N, ENERGY = 1000, {"equal": 1e4, "unequal": 1e4, "plateaus": 1e6}
+N = 1000
+ENERGY = {"equal": 1e4, "unequal": 1e4, "plateaus": 1e6}
 # Finite energy moves p_nc by O(1/v): 0.007 was seen at 1e6, N = 10,000; at 1e4 the bound is a guess.
 BIAS = {"equal": 0.02, "unequal": 0.02, "plateaus": 0.01}
 
@@ -275,7 +288,8 @@ def test_other_stays_give_another_p_nc(name, mutant, monkeypatch):
 
 def test_captures_come_when_theory_says():
     """Each stay counted once, by its begin, in both falls of nu; and the mean of exp(-s / 2) is right."""
-    scene, n = MOUTHS["plateaus"], 2000
+    scene = MOUTHS["plateaus"]
+    n = 2000
     run = fast.simulate(scene, n_particles=n, energy=1e6, seed=1)
     first, second = run.t_in[:, 0].T
     begins = np.concatenate([first, second[second != first]])

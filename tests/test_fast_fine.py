@@ -30,12 +30,14 @@ SHARP = 4.0  # units that nearly all answers keep
 WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.kernel.fine_step
 # So soon, in periods, that terms cancel; or leaving its wall so slowly, in parts of the speed, that pairs,
 # right to 2^-104 of the speed, do not tell the time to the 2^-80 of it that the fine step asks for.
-BRIEF, GRAZING = 2.0**-33, 2.0**-24
+BRIEF = 2.0**-33
+GRAZING = 2.0**-24
 START = State(0.1, 0.2, 0.3, 140.0, 30.0)
 
 
 def leaves_slowly(scene, state):
-    table, speed = table_at(fp, scene, state.t), hypot(state.vx, state.vy)
+    table = table_at(fp, scene, state.t)
+    speed = hypot(state.vx, state.vy)
     nx, ny = table.normal(state.wall, state.x, state.y)
     leaving = nx * state.vx + ny * state.vy + table.receding(state.wall, state.y)
     return abs(leaving) < GRAZING * speed
@@ -93,24 +95,25 @@ DELICATE = [
 
 @pytest.mark.parametrize(("scene", "state", "t_end", "bound"), DELICATE)
 def test_short_hops_far_from_knots_and_flights_up_deep_stems_keep_their_decimals(scene, state, t_end, bound):
-    truth, path = proved_step(scene, state, t_end, digits=60), fast.fine_trajectory(scene, state, 1)
+    truth = proved_step(scene, state, t_end, digits=60)
+    path = fast.fine_trajectory(scene, state, 1)
     dt, _, *place = path.numbers(0)
     assert compare(enclosed(path.walls[0], [dt, *place]), truth, state, bound / UNIT).verdict == "pass"
 
 
 def test_the_bound_tells_pairs_from_binary64():
-    truth, found = (
-        proved_step(load("moving-cap"), START, 10.0, 60),
-        fast.fine_trajectory(load("moving-cap"), START, 1),
-    )
+    truth = proved_step(load("moving-cap"), START, 10.0, 60)
+    found = fast.fine_trajectory(load("moving-cap"), START, 1)
     highs = [Fraction(found.steps[0, k, 0]) for k in (0, 2, 3, 4, 5)]
     assert compare(enclosed(found.walls[0], highs), truth, START, WORST / UNIT).verdict == "fail"
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-clockwise", "ergodic", "breathing-circle"])
 def test_a_path_keeps_its_digits_longer_than_binary64(name):
-    scene, n = load(name), 30
-    fine, rough = fast.fine_trajectory(scene, START, n), fast.trajectory(scene, START, n)
+    scene = load(name)
+    n = 30
+    fine = fast.fine_trajectory(scene, START, n)
+    rough = fast.trajectory(scene, START, n)
     truth = reference.trajectory(scene, START, n, digits=40)
     assert fine.walls == [step.wall for step in truth.steps]
     last = [centre(c) for c in truth.steps[-1].after]
@@ -125,10 +128,14 @@ def test_a_path_keeps_its_digits_longer_than_binary64(name):
 
 def test_rounding_a_state_of_pairs_is_not_taken_for_a_gap():
     """A side and the floor met together but for 3e-7 of 1e-10, and the low parts hold which is first."""
-    scene, d = Stem(w=1.0, h=1.0), round(1e-10 * 2**53) * 2.0**-53
+    scene = Stem(w=1.0, h=1.0)
+    d = round(1e-10 * 2**53) * 2.0**-53
     start = FineState((0.0, 0.0), (1.0 - d, 0.0), (d - 1.0, -5e-17), (1.0, 0.0), (2e-7 - 1.0, 0.0))
-    steps, met = np.empty((1, 6, 2)), np.empty(1, dtype=np.int64)
-    anchors, called_off = np.zeros(ANCHORS_SHAPE), np.zeros(1, np.int64)
-    compiled, wall = compile_scene(scene), WALL_CODES[None]
+    steps = np.empty((1, 6, 2))
+    met = np.empty(1, dtype=np.int64)
+    anchors = np.zeros(ANCHORS_SHAPE)
+    called_off = np.zeros(1, np.int64)
+    compiled = compile_scene(scene)
+    wall = WALL_CODES[None]
     n, code = fine_path(compiled, anchors, start, wall, steps, met, called_off)
     assert (n, code) == (0, records.NEAR_CORNER)

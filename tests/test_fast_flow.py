@@ -35,14 +35,16 @@ def flow_of(scene, state, t_end):
 
 def ends(scene, state, t_end, flow=flow_of):
     """Return where a flow and a path end: x, y, vx, vy; nothing of a flow that is lost."""
-    found, path = flow(scene, state, t_end), fast.trajectory(scene, state, 10_000, t_end)
+    found = flow(scene, state, t_end)
+    path = fast.trajectory(scene, state, 10_000, t_end)
     assert isinstance(path.outcome, Horizon)
     return [(o.x, o.y, o.vx, o.vy) if isinstance(o, Horizon) else () for o in (found, path.outcome)]
 
 
 def test_who_gathers_speed_for_ever_is_given_up(monkeypatch):
     """The first speed says little of how many collisions are to come: they are counted."""
-    start, most = State(0.0, 0.1, 0.2, 3.0, 4.0), 500
+    start = State(0.0, 0.1, 0.2, 3.0, 4.0)
+    most = 500
     monkeypatch.setattr(ensemble, "MOST_TO_A_TIME", most)
     monkeypatch.setattr(ensemble, "MOST_IN_CYCLES", most)
     run = fast.flow(SCENE, [start, STARTS[0]], 400.0)
@@ -72,7 +74,8 @@ def test_through_the_centre_and_unfolded_all_the_same(name, tally):
     random = np.random.default_rng(11)
     for _ in range(60):
         p, q = (float(part) for part in random.integers(-8, 9, 2))
-        k, m = 2.0 ** -random.integers(5, 8), 2.0 ** -random.integers(0, 3) * random.choice([-1.0, 1.0])
+        k = 2.0 ** -random.integers(5, 8)
+        m = 2.0 ** -random.integers(0, 3) * random.choice([-1.0, 1.0])
         if q == 0:
             continue
         state = State(0.0, k * p, k * abs(q), m * p, m * abs(q))
@@ -92,12 +95,16 @@ def lost_in_slow_caps(flow, n):
 
     There a lane's guess of the time of the next hit may be any number, or none.
     """
-    random, n_lost = np.random.default_rng(7), 0
+    random = np.random.default_rng(7)
+    n_lost = 0
     for scene in BREATHING:
         for _ in range(n // 2):
-            x, y = float(random.uniform(-0.25, 0.25)), float(random.uniform(0.02, 0.3))
-            speed, angle = random.uniform(0.4, 2.5), random.uniform(0.0, 2 * np.pi)
-            t, velocity = float(random.uniform(0.0, 8.0)), speed * np.exp(1j * angle)
+            x = float(random.uniform(-0.25, 0.25))
+            y = float(random.uniform(0.02, 0.3))
+            speed = random.uniform(0.4, 2.5)
+            angle = random.uniform(0.0, 2 * np.pi)
+            t = float(random.uniform(0.0, 8.0))
+            velocity = speed * np.exp(1j * angle)
             state = State(t, x, y, float(velocity.real), float(velocity.imag))
             found, expected = ends(scene, state, t + 8.0, flow)
             n_lost += found != pytest.approx(expected, rel=1e-6, abs=1e-6)
@@ -122,7 +129,8 @@ def test_a_flow_that_forgets_which_wall_was_met_last_loses_them():
 def test_the_first_captured_stay():
     """Frozen: a particle in the island stays from its first arc hit on; one through the mouth has no stay."""
     scene = load("frozen-mushroom")
-    inside, through = State(0.0, 0.8, 0.1, 0.1, 3.0), State(0.0, 0.0, 0.5, 0.0, -3.0)
+    inside = State(0.0, 0.8, 0.1, 0.1, 3.0)
+    through = State(0.0, 0.0, 0.5, 0.0, -3.0)
     run = fast.flow(scene, [inside, through], 9.0)
     first = fast.next_collision(scene, inside, 9.0)
     assert (run.t_in[0], run.t_out[0]) == (first.t, 9.0)
@@ -162,7 +170,10 @@ def drawn(n, energy):
 
 def test_captures_and_releases_are_those_of_a_flow():
     """So slow that some tens of collisions do not part what lanes and a trajectory round otherwise."""
-    states, end, n_captured, n_released = drawn(60, 20.0), SCENE.period, 0, 0
+    states = drawn(60, 20.0)
+    end = SCENE.period
+    n_captured = 0
+    n_released = 0
     flown = fast.flow(SCENE, states, end)
     for capture, release, t_in, t_out in zip(
         fast.follow(SCENE, states, "capture", end),

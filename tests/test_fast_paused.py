@@ -10,6 +10,7 @@ import fast
 from fast import ensemble, pieces
 from fast.kernel import follow
 from fast.kernel.arithmetic import MAX_QUADRANT
+from fast.kernel.records import BANG_BANG, CONSTANT
 from fast.prepared import prepare
 from scene import BadInput, BangBang, Cap, Fourier, Mushroom, load
 
@@ -80,11 +81,13 @@ def test_the_last_energy_is_known_however_the_horizon_is_rounded():
 
 
 @pytest.mark.usefixtures("uncached")
-def test_cycles_in_goes_without_lanes(monkeypatch):
-    """Laws of too many pieces: every step is a careful one."""
+@pytest.mark.parametrize("changes", [{"MAX_PIECES": 8}, {"IN_LANES": (CONSTANT, BANG_BANG)}], ids=str)
+def test_cycles_in_goes_without_lanes(monkeypatch, changes):
+    """Laws of too many pieces, or of a kind that lanes do not know: every step is a careful one."""
     wave = Fourier(mean=1.0, omega=1.0, sin=(0.3, 0.0, 0.05))  # three harmonics: in pieces
     asked = {"n_particles": 40, "energy": 30.0, "seed": 2}
-    monkeypatch.setattr(pieces, "MAX_PIECES", 8)
+    for limit, least in changes.items():
+        monkeypatch.setattr(pieces, limit, least)
     for scene in (Mushroom(r=wave, h=1.0, nu=0.4, slope=0.1), Cap(r=wave)):
         found = in_goes(scene, (1, 2, 5), **asked)
         assert (found.ensemble.n_careful >= found.ensemble.n_collisions).all()

@@ -23,7 +23,8 @@ from scene.refusal import BadInput
 from scene.transforms import scaled, scaled_state
 
 N_SCALINGS = int(os.environ.get("MUSHROOMS_SCALINGS", "100"))
-MOST, LONGEST = 390, 300
+MOST = 390
+LONGEST = 300
 EXPONENTS = st.integers(-MOST, MOST) | st.sampled_from((-MOST, 0, MOST))
 
 
@@ -33,11 +34,13 @@ def answers(scene, state, t_end):
     Raises:
         BadInput: this is no question, or one of them is refused.
     """
-    step, path = fast.next_collision(scene, state, t_end), fast.trajectory(scene, state, LONGEST, t_end)
+    step = fast.next_collision(scene, state, t_end)
+    path = fast.trajectory(scene, state, LONGEST, t_end)
     # In a slit hits are many: a flow goes as far as the path.
     until = t_end if len(path.walls) < LONGEST else float(path.steps[-1, 1])
     run = fast.flow(scene, [state], until, threads=1)
-    words, rows = [*path.walls, run.wall_counts.tolist()], list(path.steps)
+    words = [*path.walls, run.wall_counts.tolist()]
+    rows = list(path.steps)
     for found, dt in ((step, 0.0), (path.outcome, 0.0), (run.outcomes[0], run.t_in[0])):
         if isinstance(found, Rejected):
             raise BadInput(found.reason)
@@ -99,11 +102,14 @@ def test_the_search_sees_a_stepper_that_does_not_scale(monkeypatch, tally):
 
 
 def test_an_ensemble_scales_to_the_bit():
-    scene, length, time = load("moving-cap"), 380, -350
+    scene = load("moving-cap")
+    length = 380
+    time = -350
     energy = 2.0 ** (2 * (length - time) - 1000) * 1e3 * 2.0**300  # of a table that is slower by 2^-350
     with pytest.raises(BadInput):
         fast.simulate(scaled(scene, 2 * length, time), n_particles=5, energy=energy)
-    length, time = 190, 150
+    length = 190
+    time = 150
     one = fast.simulate(scene, n_particles=5, energy=1e3, seed=2)
     other = fast.simulate(
         scaled(scene, length, time), n_particles=5, energy=1e3 * 4.0 ** (length - time), seed=2
@@ -145,7 +151,8 @@ def test_what_is_rounded_up_to_the_least_normal_number_is_refused(exponent):
 @pytest.mark.parametrize(("speed", "is_kept"), [(-20, True), (-26, False), (-30, False)])
 def test_a_path_that_overflows_is_undecided(speed, is_kept):
     """Of so large a table: dt = 2^(1000 - speed) is beyond the largest float from 2^1024 on."""
-    cap, state = Cap(r=2.0**1000), State(0.0, 0.0, 2.0**999, 0.0, 2.0**speed)
+    cap = Cap(r=2.0**1000)
+    state = State(0.0, 0.0, 2.0**999, 0.0, 2.0**speed)
     if is_kept:
         assert fast.trajectory(cap, state, 1).steps[0, 0] == 2.0 ** (999 - speed)
     else:
@@ -156,7 +163,8 @@ def test_a_path_that_overflows_is_undecided(speed, is_kept):
 
 def test_a_path_to_a_place_that_no_float_holds_is_undecided():
     """Its collisions stand: they were found before."""
-    cap, state = Cap(r=2.0**-1000), State(0.0, 0.0, 2.0**-1002, 3 * 2.0**-1070, 2.0**-1003)
+    cap = Cap(r=2.0**-1000)
+    state = State(0.0, 0.0, 2.0**-1002, 3 * 2.0**-1070, 2.0**-1003)
     assert "beyond binary64" in fast.next_collision(cap, state, 0.1).reason
     for t_end, walls in ((0.1, []), (20.1, ["arc", "base"])):
         found = fast.trajectory(cap, state, 3, t_end)
@@ -166,12 +174,17 @@ def test_a_path_to_a_place_that_no_float_holds_is_undecided():
 
 def test_a_stay_that_no_float_holds_is_one_particle_s():
     """Beside so short a period some times of capture would lose their last bits."""
-    period, size = 2.0**-1021, 2.0**-500
+    period = 2.0**-1021
+    size = 2.0**-500
     knots = ((0.0, 0.9), (period / 2, 0.3), (period, 0.9))
-    scene, speed, random = Mushroom(r=size, h=size, nu=BangBang(knots=knots)), 20 * size / period, Random(3)
+    scene = Mushroom(r=size, h=size, nu=BangBang(knots=knots))
+    speed = 20 * size / period
+    random = Random(3)
     states = []
     for _ in range(100):
-        angle, x, y = random.uniform(0, 6.28), random.uniform(-0.6, 0.6), random.uniform(0.05, 0.6)
+        angle = random.uniform(0, 6.28)
+        x = random.uniform(-0.6, 0.6)
+        y = random.uniform(0.05, 0.6)
         state = State(0.0, size * x, size * y, speed * math.cos(angle), speed * math.sin(angle))
         if isinstance(fast.next_collision(scene, state, period), Collision):
             states.append(state)

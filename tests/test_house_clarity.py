@@ -20,24 +20,6 @@ MAX_PARAMETERS = 10
 MAX_WIDTH = 100  # columns
 # Typer makes a command's options of the parameters of a function.
 OF_OPTIONS = ("mushrooms/commands.py",)
-# Not yet: these hand the options on one by one, and their lines fit 110 columns. Each must still need it.
-WAITING = {
-    "mushrooms/audit/command.py: audit_claims",
-    "mushrooms/check.py: check_stepper",
-    "mushrooms/simulate.py: simulate_scene",
-}
-WIDE = {
-    "mushrooms/audit/command.py",
-    "mushrooms/audit/ensemble_command.py",
-    "mushrooms/audit/session.py",
-    "mushrooms/bench.py",
-    "mushrooms/check.py",
-    "mushrooms/commands.py",
-    "mushrooms/draw.py",
-    "mushrooms/questions.py",
-    "mushrooms/scenes.py",
-    "mushrooms/simulate.py",
-}
 
 
 def is_packed(node: ast.AST) -> bool:
@@ -141,14 +123,12 @@ def test_a_statement_holds_one_thought(folder):
 @pytest.mark.parametrize("folder", CLEAR)
 def test_functions_can_be_followed(folder):
     assert complex_functions(sources_of(folder)) == []
-    due = {name for name in WAITING if name.startswith(f"{folder}/")}
-    assert set(crowded_functions(sources_of(folder))) == due
+    assert crowded_functions(sources_of(folder)) == []
 
 
 @pytest.mark.parametrize("folder", CLEAR)
 def test_lines_fit_a_column(folder):
-    due = {path for path in WIDE if path.startswith(f"{folder}/")}
-    assert {line.partition(":")[0] for line in wide_lines(sources_of(folder))} == due
+    assert wide_lines(sources_of(folder)) == []
 
 
 @pytest.mark.parametrize(

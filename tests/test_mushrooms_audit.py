@@ -161,6 +161,12 @@ def test_no_run_is_replaced_and_broken_findings_are_made_again(call, tmp_path, b
     assert len(blocks) == 6
 
 
+def test_without_a_folder_there_is_nothing_to_take_up(everything):
+    """Nor without being told to."""
+    claim = next(one for one in everything.claims if one.id == "M8")
+    assert session._kept(claim, AuditSettings(resume=True)) == {}
+
+
 def test_what_a_killed_audit_was_writing_is_taken_away(call, tmp_path):
     (tmp_path / "findings").mkdir()
     left = tmp_path / ".report.html.7.part", tmp_path / "findings" / ".M8.finding.7.part"

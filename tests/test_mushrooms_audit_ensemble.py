@@ -13,9 +13,9 @@ from support.refusals import assert_refused
 
 import scene as scenes
 import theory
-from mushrooms.audit import ensemble_command
+from mushrooms.audit import ensemble_command, ensemble_table
 from mushrooms.audit.ensemble_checks import GivenEnsemble, HighEnergies, checks, expected, reversal
-from mushrooms.audit.ensemble_command import Reading
+from mushrooms.audit.ensemble_table import Reading
 
 N = 2_500
 # Ensembles that take longest.
@@ -80,8 +80,8 @@ def test_a_seeded_sample_of_theory_passes_in_other_units_and_forms(tmp_path, rig
     cycles = {**right, "t_in": right["t_in"] / (2 * np.pi), "t_out": right["t_out"] / (2 * np.pi)}
     doubled = {**cycles, "E0": 2 * cycles["E0"], "E1": 2 * cycles["E1"]}
     options = Reading(None, "v2", None, None)
-    given, notes = ensemble_command.read(write(tmp_path / "e.csv", doubled), SCENE, options)
-    here, _ = ensemble_command.read(write(tmp_path / "f.csv", right), SCENE, PLAIN)
+    given, notes = ensemble_table.read(write(tmp_path / "e.csv", doubled), SCENE, options)
+    here, _ = ensemble_table.read(write(tmp_path / "f.csv", right), SCENE, PLAIN)
     assert given.energy == practice_engine.ENERGY
     assert "times are taken as parts of a cycle, inferred" in notes
     assert np.nanmax(np.abs(given.t_in - here.t_in)) < 1e-12
@@ -92,7 +92,7 @@ def test_a_seeded_sample_of_theory_passes_in_other_units_and_forms(tmp_path, rig
     cells = [["" if np.isnan(x) else float(x).hex() for x in column] for column in right.values()]
     (tmp_path / "hex.csv").write_text("\n".join(map(",".join, [list(right), *zip(*cells, strict=True)])))
     for form in ("e.parquet", "e.zarr", "hex.csv"):
-        same, _ = ensemble_command.read(tmp_path / form, SCENE, PLAIN)
+        same, _ = ensemble_table.read(tmp_path / form, SCENE, PLAIN)
         assert np.array_equal(same.s, here.s)
         assert np.array_equal(same.t_out, here.t_out, equal_nan=True)
 

@@ -14,7 +14,7 @@ from mpmath import fp
 from support.refusals import one_line
 
 import theory
-from mushrooms.audit import ensemble_checks as audited, ensemble_command
+from mushrooms.audit import ensemble_checks as audited, ensemble_command, ensemble_table
 from mushrooms.audit.claim import Check
 from mushrooms.audit.ensemble_checks import (
     CAPTURED,
@@ -35,7 +35,8 @@ from mushrooms.audit.ensemble_checks import (
     nu_at,
     reversal,
 )  # fmt: skip
-from mushrooms.audit.ensemble_command import EnsembleAudit, Reading
+from mushrooms.audit.ensemble_command import EnsembleAudit
+from mushrooms.audit.ensemble_table import Reading
 from scene import Fourier, Mushroom, load
 from scene.geometry import table_at
 from scene.laws import value
@@ -350,7 +351,7 @@ def test_the_worst_place_of_the_reversal_identity_counts():
 def read(tmp_path: Path, rows: str, scene: Mushroom = SCENE, **options) -> tuple[GivenEnsemble, list[str]]:
     path = tmp_path / "e.csv"
     path.write_text(rows)
-    return ensemble_command.read(path, scene, PLAIN._replace(**options))
+    return ensemble_table.read(path, scene, PLAIN._replace(**options))
 
 
 def table(times, energy: float = ENERGY) -> str:
@@ -428,14 +429,14 @@ def test_arrays_of_unequal_lengths_and_folders_without_arrays_are_refused(tmp_pa
     group = zarr.open_group(tmp_path / "e.zarr", mode="w")
     for name, n in (("E0", 3), ("E1", 3), ("t_in", 2)):
         group.create_array(name, data=np.ones(n))
-    line = one_line(ensemble_command.read, tmp_path / "e.zarr", SCENE, PLAIN)
+    line = one_line(ensemble_table.read, tmp_path / "e.zarr", SCENE, PLAIN)
     assert "arrays of" in line
     assert "'t_in': 2" in line
     assert "must be as many in each" in line
     (tmp_path / "none.zarr").mkdir()
     (tmp_path / "none.zarr" / "zarr.json").write_text("{")
     for name in ("none.zarr", "absent.zarr"):
-        assert "is no Zarr group" in one_line(ensemble_command.read, tmp_path / name, SCENE, PLAIN)
+        assert "is no Zarr group" in one_line(ensemble_table.read, tmp_path / name, SCENE, PLAIN)
 
 
 def test_a_group_of_zarr_has_cycles_in_columns_and_the_first_of_several_narrowings(tmp_path):
@@ -443,7 +444,7 @@ def test_a_group_of_zarr_has_cycles_in_columns_and_the_first_of_several_narrowin
     group = zarr.open_group(tmp_path / "run" / "ensemble.zarr", mode="w")
     group.create_array("cycle_energies", data=np.array([[2e6, 3e6], [4e6, 5e6]]))
     group.create_array("t_in", data=np.array([[1.0, 9.0], [np.nan, np.nan]]))
-    given, _ = ensemble_command.read(tmp_path / "run", SCENE, PLAIN._replace(time_unit="scene"))
+    given, _ = ensemble_table.read(tmp_path / "run", SCENE, PLAIN._replace(time_unit="scene"))
     assert given.s == pytest.approx(np.log([2.0, 4.0]))
     assert given.later == pytest.approx(np.log([[3.0], [5.0]]))
     assert given.t_in.tolist() == pytest.approx([1.0, np.nan], nan_ok=True)
@@ -453,7 +454,7 @@ def test_a_group_of_zarr_has_cycles_in_columns_and_the_first_of_several_narrowin
 def test_without_arrow_the_cells_are_read_alike(tmp_path, monkeypatch):
     rows = "E0,E1,captured\n" + "".join(f"1e6,{2e6 + k},{k % 2}\n" for k in range(30))
     before, _ = read(tmp_path, rows)
-    monkeypatch.setattr(ensemble_command, "FEW", 7)
+    monkeypatch.setattr(ensemble_table, "FEW", 7)
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     after, _ = read(tmp_path, rows)
     assert after.s.tolist() == before.s.tolist()

@@ -20,7 +20,7 @@ from support.refusals import assert_refused
 import fast
 import mushrooms
 from mushrooms import draw
-from mushrooms.audit import ensemble_command
+from mushrooms.audit import ensemble_table
 from mushrooms.main import run
 from mushrooms.store import export as exports
 from mushrooms.store.run import open_run
@@ -123,8 +123,8 @@ def of_npz(folder):
 
 def of_audit(path, energy=None):
     def read(_folder):
-        options = ensemble_command.Reading(energy, "v2/2", None, None)
-        given, _notes = ensemble_command.read(Path(path), load("moving-cap"), options)
+        options = ensemble_table.Reading(energy, "v2/2", None, None)
+        given, _notes = ensemble_table.read(Path(path), load("moving-cap"), options)
         return ENERGY * np.exp(given.s)
 
     return read

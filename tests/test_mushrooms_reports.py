@@ -241,7 +241,7 @@ def cells(row: str) -> list[str]:
     return [re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<t[hd].*?</t[hd]>", row, re.S)]
 
 
-def test_the_page_of_a_check_counts_verdicts_by_group():
+def test_the_page_of_a_check_counts_verdicts_by_group(figures):
     """A verdict that nothing has gets no column, but for pass; a known failure is listed with its mark."""
     known = [
         a_result("arc/2", "fail", "as it is", is_known=True),

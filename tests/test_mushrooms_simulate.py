@@ -28,8 +28,8 @@ import fast
 import theory
 from fast.kernel.follow import LANE_ROWS
 from mushrooms import progress
-from mushrooms.audit import ensemble_command
-from mushrooms.audit.ensemble_command import Reading
+from mushrooms.audit import ensemble_table
+from mushrooms.audit.ensemble_table import Reading
 from mushrooms.folders import LOCK, locked
 from mushrooms.main import run
 from mushrooms.store import conduct
@@ -432,7 +432,7 @@ def test_exports_have_every_bit(command_line, stored, tmp_path):
         for found in (rows, table):
             np.testing.assert_array_equal(np.asarray(found[name]), column)
     for path in (tmp_path / "run.csv", tmp_path / "run.parquet", stored):  # and the audit reads them
-        given, _ = ensemble_command.read(path, load("moving-cap"), Reading(ENERGY, "v2/2", "scene", None))
+        given, _ = ensemble_table.read(path, load("moving-cap"), Reading(ENERGY, "v2/2", "scene", None))
         takes_part = np.isfinite(ensemble.energy)
         np.testing.assert_array_equal(given.s, np.log(ensemble.energy[takes_part] / ENERGY))
         np.testing.assert_array_equal(given.t_in, ensemble.t_in[takes_part, 0, 0])

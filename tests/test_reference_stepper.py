@@ -45,7 +45,8 @@ def hit(scene, state, t_end=100.0, digits=40):
 
 
 def test_a_path_of_fixed_precision_ends_where_it_no_longer_tells():
-    scene, start = load("moving-cap"), State(0.1, 0.2, 0.3, 140.0, 30.0)
+    scene = load("moving-cap")
+    start = State(0.1, 0.2, 0.3, 140.0, 30.0)
     few, more = (reference.trajectory(scene, start, 60, working=digits) for digits in (20, 40))
     assert 5 < len(few.steps) < len(more.steps) <= 60
     assert isinstance(few.outcome, Undecided)
@@ -98,7 +99,8 @@ def test_trajectory_encloses_its_last_state():
     assert len(path.steps) == 30
     assert path.digits < finer.digits
     assert [s.wall for s in path.steps] == [s.wall for s in finer.steps]
-    last, truth = path.steps[-1].after, finer.steps[-1].after
+    last = path.steps[-1].after
+    truth = finer.steps[-1].after
     for a, b in zip(last, truth, strict=True):
         assert a.lo <= b.lo <= b.hi <= a.hi
         assert a.width() < 1e-28
@@ -137,7 +139,8 @@ def test_digits_are_what_was_asked_for(scene, digits):
 
 def test_few_digits_refuse_no_start_on_its_wall():
     """Whether a place is on its wall is left open where digits are too few to tell, and not denied."""
-    scene, start = Stem(w=1 / 3, h=1.0, slope=0.3), State(0.1, 1 / 3 - 0.3 * 0.7, -0.7, -1.0, 0.3, "right")
+    scene = Stem(w=1 / 3, h=1.0, slope=0.3)
+    start = State(0.1, 1 / 3 - 0.3 * 0.7, -0.7, -1.0, 0.3, "right")
     paths = [reference.trajectory(scene, start, 1, working=digits) for digits in range(1, 12)]
     assert isinstance(paths[0].outcome, Undecided)
     assert [step.wall for step in paths[-1].steps] == ["left"]
@@ -159,9 +162,12 @@ def many_harmonics(seed):
         cos, sin = ([a * f(x) for a, x in zip(factors, angles, strict=True)] for f in (math.cos, math.sin))
         return Fourier(mean=mean, omega=1.0, cos=tuple(cos), sin=tuple(sin))
 
-    w, h, slope = ripples(0.5) if seed % 2 else 0.5, ripples(draw.uniform(1.0, 2.5)), draw.choice((0.0, 0.05))
+    w = ripples(0.5) if seed % 2 else 0.5
+    h = ripples(draw.uniform(1.0, 2.5))
+    slope = draw.choice((0.0, 0.05))
     scene = Mushroom(r=1.5, w=w, h=h, slope=slope) if seed % 3 == 0 else Stem(w=w, h=h, slope=slope)
-    speed, angle = draw.choice((0.0, 10 ** draw.uniform(-4, -2))), draw.uniform(0, 6)
+    speed = draw.choice((0.0, 10 ** draw.uniform(-4, -2)))
+    angle = draw.uniform(0, 6)
     y = -draw.uniform(0.02, 0.7) * h.mean
     return scene, State(0.5, draw.uniform(-0.2, 0.2), y, speed * math.cos(angle), speed * math.sin(angle))
 
@@ -194,7 +200,8 @@ SLOW_FLOORS = (
 def test_a_hit_near_the_end_of_a_search_is_found(floor, end, beyond):
     """A search looks a little farther than it ends; what it finds there is known to the next one."""
     width = end * (1.0 + beyond)
-    scene, state = Stem(w=width, h=floor), State(0.0, 0.0, -0.5, 1.0, 0.0)
+    scene = Stem(w=width, h=floor)
+    state = State(0.0, 0.0, -0.5, 1.0, 0.0)
     found = hit(scene, state, 1000.0)
     assert found.wall == "right"
     assert found.dt.contains(width)
@@ -282,7 +289,8 @@ def presymplectic(vx, vy):
 
 def is_kept(jacobian, start, end, tolerance):
     """Tell whether the map with this Jacobian keeps the form, to a share of its terms."""
-    before, after = (Fraction(start.vx), Fraction(start.vy)), (centre(end.vx), centre(end.vy))
+    before = (Fraction(start.vx), Fraction(start.vy))
+    after = (centre(end.vx), centre(end.vy))
     form = jacobian.T @ presymplectic(*after) @ jacobian
     size = max(1, *abs(jacobian).flat) ** 2 * (1 + max(map(abs, after)))
     return (abs(form - presymplectic(*before)) <= tolerance * size).all()
@@ -330,8 +338,11 @@ def test_jacobian_against_differences(start, walls):
 def hops(rng):
     """Return a cap and a start on its arc, residual and all, from which the arc is met again and again."""
     r = Fourier(mean=1.0, omega=1.0, cos=(rng.choice((0.0, 0.1)),)) if rng.random() < 0.5 else 1.0
-    t, angle, lift = rng.uniform(-3.0, 3.0), rng.uniform(0.05, 0.2), rng.uniform(0.02, 0.1)
-    now, off = float(value(fp, r, t)), 1.0 + rng.uniform(-1.0, 1.0) * 2.0**-24
+    t = rng.uniform(-3.0, 3.0)
+    angle = rng.uniform(0.05, 0.2)
+    lift = rng.uniform(0.02, 0.1)
+    now = float(value(fp, r, t))
+    off = 1.0 + rng.uniform(-1.0, 1.0) * 2.0**-24
     x, y = now * off * math.cos(angle), now * off * math.sin(angle)
     return Cap(r=r), State(t, x, y, -4.0 * math.sin(angle + lift), 4.0 * math.cos(angle + lift), "arc")
 
@@ -379,7 +390,8 @@ def test_condition_number_of_a_head_on_hit():
 def test_at_a_knot_the_sensitivity_is_that_of_the_steeper_side(time):
     """Starts that differ by single roundings meet the wall on either side of a jump of its acceleration."""
     law = BangBang(((0.0, 1.0), (1.0, 0.6), (1.5, 0.85), (4.0, 1.0)))
-    begin, v = time - 0.75, 0.9
+    begin = time - 0.75
+    v = 0.9
     x = v * (time - begin) - float(value(fp, law, time))
     starts = [State(begin + k * math.ulp(begin), x, -0.5, -v, 0.01) for k in range(-3, 4)]
     found = [proved_step(Mushroom(r=2.0, h=2.0, w=law, slope=0.0), s, 10.0).steps[0] for s in starts]

@@ -73,7 +73,9 @@ def test_a_mouth_that_opens_fully_at_no_round_time(wave: tuple[int, int]) -> Non
     cos, sin = wave
     # w = r (m + c cos t + s sin t), r = 1 + sin t / 2, exact in binary64: w / r touches 1, and rounding
     # carries it above at some digits.
-    c, s, m = cos / 32, sin / 32, 1 - 5 / 32
+    c = cos / 32
+    s = sin / 32
+    m = 1 - 5 / 32
     w = Fourier(mean=m + s / 4, omega=1.0, cos=(c, -s / 4), sin=(s + m / 2, c / 4))
     scene = Mushroom(r=Fourier(mean=1.0, omega=1.0, sin=(0.5,)), h=1.0, w=w)
     for digits in range(5, 25):
@@ -131,8 +133,10 @@ def test_waves_are_summed_to_their_last_bits(size: float, digits: int) -> None:
         tuple((size * draw.uniform(-1, 1, 16) * 10.0 ** -draw.integers(0, 9, 16)).tolist()) for _ in "ab"
     )
     law = Fourier(mean=0.5, omega=1.7, cos=tuple(0.03 * c for c in cos), sin=tuple(0.03 * s for s in sin))
-    ctx, finer = MPContext(), MPContext()
-    ctx.dps, finer.dps = digits, digits + 400
+    ctx = MPContext()
+    finer = MPContext()
+    ctx.dps = digits
+    finer.dps = digits + 400
     motion = MovingMushroom(ctx, prepare(Mushroom(r=1.0, h=1.0, nu=law)), Fraction(0))
     for t in draw.uniform(0, 3, 5).tolist():
         nu, rate = (finer.mpf(x) for x in motion.nu(ctx.mpf(t)))
@@ -151,7 +155,8 @@ def test_the_table_of_equations_names_what_exists() -> None:
     tests = Path(__file__).parent
     table = (tests.parent / "theory" / "equations.md").read_text("utf-8")
     written = "".join(file.read_text("utf-8") for file in tests.glob("test_*.py"))
-    functions, cases = re.findall(r"`(\w+)\.(\w+)`", table), re.findall(r"`(test_\w+)`", table)
+    functions = re.findall(r"`(\w+)\.(\w+)`", table)
+    cases = re.findall(r"`(test_\w+)`", table)
     assert len(functions) > 15
     for module, function in functions:
         room = "" if find_spec(f"theory.{module}") else "finite_energy."
@@ -212,22 +217,27 @@ def adiabatic_model(n: int, seed: int, most: int = 9) -> tuple[Floats, NDArray[n
     number of captures of each.
     """
     t = np.linspace(0.0, 2 * np.pi, 40_001)
-    r, h = 1 + np.sin(t) / 2, 1 + np.cos(t) / 4 - np.sin(t) / 4
+    r = 1 + np.sin(t) / 2
+    h = 1 + np.cos(t) / 4 - np.sin(t) / 4
     nu = 0.5 + 0.125 * np.cos(t) + 0.25 * np.cos(2 * t)
-    cap, stem = np.pi**2 * r**2, 2 * np.pi * (2 * nu * r * h - 0.0625 * h**2)
+    cap = np.pi**2 * r**2
+    stem = 2 * np.pi * (2 * nu * r * h - 0.0625 * h**2)
     delta = 2 / np.pi * (np.arccos(nu) - nu * np.sqrt(1 - nu**2))
     chaotic = cap + stem - delta * cap
     flux = np.diff(delta) * ((cap / chaotic)[1:] + (cap / chaotic)[:-1]) / 2
     spent = np.concatenate([[0.0], np.cumsum(np.maximum(flux, 0.0))])
     gain = -np.log(chaotic / chaotic[0]) - np.concatenate([[0.0], np.cumsum(flux)])
-    released, open_ = t.copy(), [0]
+    released = t.copy()
+    open_ = [0]
     for i in range(1, t.size):
         while open_ and nu[i] >= nu[open_[-1]]:
             released[open_.pop()] = t[i]
         open_.append(i)
     released[open_] = t[open_]
     rng = np.random.Generator(np.random.Philox(seed))
-    now, s, n_captures = np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.int64)
+    now = np.zeros(n)
+    s = np.zeros(n)
+    n_captures = np.zeros(n, dtype=np.int64)
     alive = np.arange(n)
     for _ in range(most):
         threshold = np.interp(now[alive], t, spent) + rng.exponential(size=alive.size)
@@ -302,7 +312,8 @@ def test_mean_exp_minus_s_is_one_to_40_digits_with_recapture() -> None:
 
 def test_a_reversed_cycle_with_recapture_is_the_forward_one_weighted_by_exp_minus_s() -> None:
     # K'(q) of the reversed cycle is K(-1 - q): all its cumulants are those at q = -1, signs alternating.
-    back, ahead = cumulants(reversed_cycle(TWICE), 3, digits=15), cumulants(TWICE, 3, digits=15, q=-1.0)
+    back = cumulants(reversed_cycle(TWICE), 3, digits=15)
+    ahead = cumulants(TWICE, 3, digits=15, q=-1.0)
     for k in (1, 2, 3):
         assert abs(back[k] - (-1) ** k * ahead[k]) < 1e-15
 
@@ -316,7 +327,8 @@ def test_two_rounds_of_a_cycle_are_two_independent_cycles() -> None:
         h=1.0,
         nu=Fourier(mean=0.75, omega=1.0, cos=(0.0, 0.125)),
     )
-    once, twice = cumulants(one, 4, digits=10, q=0.5), cumulants(two, 4, digits=10, q=0.5)
+    once = cumulants(one, 4, digits=10, q=0.5)
+    twice = cumulants(two, 4, digits=10, q=0.5)
     assert len(Cycle.of(two, 10).well.children) == 2
     for a, b in zip(once, twice, strict=True):
         assert abs(b / (2 * a) - 1) < 1e-9

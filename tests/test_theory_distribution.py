@@ -51,7 +51,8 @@ from theory.volumes import delta_slope
 
 
 def test_curve_runs_from_nothing_to_the_uncaptured() -> None:
-    curve, found = capture_curve(load("moving-cap"), 101), predict(load("moving-cap"))
+    curve = capture_curve(load("moving-cap"), 101)
+    found = predict(load("moving-cap"))
     assert all(column.shape == (101,) and column.dtype == np.float64 for column in curve)
     assert np.all(np.diff(curve.t_in) > 0)
     assert np.all(np.diff(curve.p_cha) < 0)
@@ -67,7 +68,8 @@ def test_curve_points_satisfy_the_definitions() -> None:
     np.testing.assert_allclose(curve.t_out, 2 * np.pi - curve.t_in, rtol=1e-14)
     np.testing.assert_allclose(curve.nu, 0.6 + 0.4 * np.cos(curve.t_in), rtol=1e-14)
     for t_in, t_out, log_g in zip(curve.t_in, curve.t_out, curve.log_g, strict=True):
-        at_capture, at_release = volumes_at(fp, scene, float(t_in)), volumes_at(fp, scene, float(t_out))
+        at_capture = volumes_at(fp, scene, float(t_in))
+        at_release = volumes_at(fp, scene, float(t_out))
         g = at_capture.v_cha / at_capture.v_cap / (at_release.v_cha / at_release.v_cap)
         assert log_g == pytest.approx(np.log(g), abs=1e-13)
 
@@ -89,7 +91,8 @@ def test_largest_gain_of_the_moving_cap() -> None:
 
 def test_largest_gain_at_an_end_of_the_curve() -> None:
     # Clockwise the gain falls with every later capture: the first captured gain -log g(w1).
-    best, curve = largest_gain(load("fixed-cap-clockwise")), capture_curve(load("fixed-cap-clockwise"))
+    best = largest_gain(load("fixed-cap-clockwise"))
+    curve = capture_curve(load("fixed-cap-clockwise"))
     assert best == (0.25, curve.s[0])
     assert np.all(np.diff(curve.s) < 0)
 
@@ -121,9 +124,11 @@ def test_capture_time_masses_are_differences_of_p_cha() -> None:
 
 
 def test_chaotic_zone_through_the_cycle() -> None:
-    scene, found = load("moving-cap"), predict(load("moving-cap"))
+    scene = load("moving-cap")
+    found = predict(load("moving-cap"))
     curve = capture_curve(scene, 9)
-    falling, rising = chaotic_zone(scene, curve.t_in), chaotic_zone(scene, curve.t_out[1:])
+    falling = chaotic_zone(scene, curve.t_in)
+    rising = chaotic_zone(scene, curve.t_out[1:])
     np.testing.assert_allclose(falling.p_cha, curve.p_cha, atol=3e-7)
     np.testing.assert_allclose(rising.p_cha, curve.p_cha[1:], atol=3e-7)
     # The energy gained in the chaotic zone before capture, in the cap, and after release.
@@ -196,17 +201,20 @@ def figures() -> tuple[Prediction, Prediction]:
     [("moving-cap", "moving-cap-reversed"), ("fixed-cap-anticlockwise", "fixed-cap-clockwise")],
 )
 def test_reversed_scenes_are_those_of_the_catalogue(name: str, opposite: str) -> None:
-    there, back = predict(reversed_cycle(load(name)), 6), predict(load(opposite), 6)
+    there = predict(reversed_cycle(load(name)), 6)
+    back = predict(load(opposite), 6)
     assert there.strings(6) == back.strings(6)
     assert reversed_cycle(reversed_cycle(load(name))) == load(name)
 
 
 def test_moments_of_any_order_are_those_of_the_prediction() -> None:
-    found, powers = predict(load("moving-cap"), 8), moments(load("moving-cap"), 4, digits=8)
+    found = predict(load("moving-cap"), 8)
+    powers = moments(load("moving-cap"), 4, digits=8)
     assert abs(powers[1] - found.m1) < 1e-8
     assert abs(powers[2] - found.sd**2 - found.m1**2) < 1e-8
     curve = capture_curve(load("moving-cap"), 20_001)
-    weights, middle = -np.diff(curve.p_cha), (curve.s[1:] + curve.s[:-1]) / 2
+    weights = -np.diff(curve.p_cha)
+    middle = (curve.s[1:] + curve.s[:-1]) / 2
     fourth = weights @ middle**4 + float(found.p_nc * found.log_e_nc**4)
     assert float(powers[4]) == pytest.approx(fourth, rel=1e-6)
     assert powers[0] == pytest.approx(1, abs=1e-12)
@@ -215,15 +223,18 @@ def test_moments_of_any_order_are_those_of_the_prediction() -> None:
 @pytest.mark.deep
 def test_reversal_holds_to_40_digits() -> None:
     # p_nc' = p_nc exp(-s_nc), m1' = -mean s exp(-s), p'(-s) = p(s) exp(-s), mean exp(-s) = 1.
-    scene, small = load("fixed-cap-clockwise"), mpmath.mpf(10) ** -40
+    scene = load("fixed-cap-clockwise")
+    small = mpmath.mpf(10) ** -40
     back = reversed_cycle(scene)
-    ahead, behind = predict(scene, 41), predict(back, 41)
+    ahead = predict(scene, 41)
+    behind = predict(back, 41)
     ctx = ahead.m1.context
     assert abs(behind.p_nc - ahead.p_nc * ctx.exp(-ahead.log_e_nc)) < small
     assert abs(behind.m1 + cumulants(scene, 1, 41, q=-1.0)[1]) < small
     assert abs(ahead.mean_exp_minus - 1) < small
     levels = (0.7, 0.75)
-    forward, backward = density_at(scene, levels, 41), density_at(back, [-s for s in levels], 41)
+    forward = density_at(scene, levels, 41)
+    backward = density_at(back, [-s for s in levels], 41)
     for s, p, q in zip(levels, forward, backward, strict=True):
         assert p > 0.1
         assert abs(q - p * ctx.exp(-s)) < small
@@ -241,7 +252,8 @@ def test_distribution_in_floats_is_that_at_many_digits() -> None:
 def test_distribution_rises_from_nothing_to_one_and_steps_at_the_uncaptured(
     solved: tuple[Energies, Energies], figures: tuple[Prediction, Prediction]
 ) -> None:
-    found, one = solved[0], figures[0]
+    found = solved[0]
+    one = figures[0]
     place = float(one.log_e_nc)
     levels = np.array([-1.0, place - 1e-9, place + 1e-9, 0.8, 0.9])
     p = energy_cdf(found, levels)
@@ -252,7 +264,8 @@ def test_distribution_rises_from_nothing_to_one_and_steps_at_the_uncaptured(
 
 
 def test_density_is_the_slope_of_the_distribution_between_caustics() -> None:
-    scene, step = load("moving-cap"), mpmath.mpf(2) ** -20
+    scene = load("moving-cap")
+    step = mpmath.mpf(2) ** -20
     levels = (-0.3, 0.25, 0.845)
     *density, above, below = density_at(scene, [*levels, 0.9, -0.5], 10)
     p_cdf = cdf_at(scene, [s + sign * step for s in levels for sign in (1, -1)], 12)
@@ -340,7 +353,9 @@ def test_two_captures_in_a_small_cycle_are_their_double_integral() -> None:
 
 def test_many_cycles_agree_with_chance(solved: tuple[Energies, Energies]) -> None:
     # Independent draws from the distribution of one cycle, by inverting it.
-    one, n_cycles, n = solved[0], 10, 40_000
+    one = solved[0]
+    n_cycles = 10
+    n = 40_000
     grid = np.linspace(one.s_nc - 1e-9, 0.8462, 20_001)
     rng = np.random.Generator(np.random.Philox(5))
     draws = np.interp(rng.random((n, n_cycles)), one.cdf(grid), grid).sum(axis=1)
@@ -368,7 +383,8 @@ def saddle_point(scene: Mushroom, q: float, n_cycles: int) -> tuple[float, float
 def test_the_saddle_point_meets_the_convolution_and_the_gaussian_does_not(
     solved: tuple[Energies, Energies], figures: tuple[Prediction, Prediction]
 ) -> None:
-    n_cycles, one = 30, figures[0]
+    n_cycles = 30
+    one = figures[0]
     spread = float(one.sd) * np.sqrt(n_cycles)
     rows = [saddle_point(load("moving-cap"), k / spread, n_cycles) for k in (-3.0, -1.0, 0.1, 1.0, 3.0)]
     s, density, below, above = np.transpose(rows)
@@ -418,7 +434,8 @@ def test_the_rate_is_the_least_of_minus_log_phi(name: str) -> None:
 
 @pytest.mark.parametrize(("forward", "backward"), PAIRS)
 def test_a_cycle_and_its_reverse_are_equally_rare(forward: str, backward: str) -> None:
-    one, other = rarity(load(forward), 20), rarity(load(backward), 20)
+    one = rarity(load(forward), 20)
+    other = rarity(load(backward), 20)
     assert abs(one.rate - other.rate) < mpmath.mpf(10) ** -21
     assert abs(one.place + other.place + 1) < mpmath.mpf(10) ** -19
     assert abs(one.place - other.place) > 0.02
@@ -456,7 +473,9 @@ Drawn = np.random.Generator
 
 def retracing(rng: Drawn) -> Mushroom:
     """Draw a loop that runs back along itself while nu is above a half: h is 3 r / 4 there."""
-    ends, turn, excess = rng.uniform(0.5, 1.5, 2), rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5)
+    ends = rng.uniform(0.5, 1.5, 2)
+    turn = rng.uniform(0.5, 1.5)
+    excess = rng.uniform(0.5, 1.5)
     times = [0.0, 1.0, 2.0, 3.0, 4.0, 4.0 + rng.uniform(0.2, 0.8), 6.0]
 
     def through(values: list[float]) -> BangBang:
@@ -502,7 +521,8 @@ def test_telling_them_apart_by_rounding_is_found_out(monkeypatch: pytest.MonkeyP
 
 def drawn_losses(scene: Mushroom, n_cycles: int) -> tuple[float, float]:
     """Draw the share of E_n < E_0, and its error, in cycles with one interval of capture."""
-    curve, found = capture_curve(scene, 100_001), solve(scene)
+    curve = capture_curve(scene, 100_001)
+    found = solve(scene)
     u = np.random.default_rng(7).random((200_000, n_cycles))
     gain = np.interp(u, curve.p_cha[::-1], curve.s[::-1])
     share = (np.where(u < found.p_nc, found.s_nc, gain).sum(axis=1) < -1e-9).mean()
@@ -535,7 +555,8 @@ def test_the_uncaptured_of_a_loop_that_is_its_own_reverse_are_not_lost(n: int) -
 @pytest.mark.parametrize("ctx", [fp, decimals(30)], ids=["floats", "30 digits"])
 def test_compressed_masses_keep_the_means_of_polynomials(ctx) -> None:
     """Of masses that differ by rounding one is left; of few none is taken away."""
-    grid, many = Grid(ctx, 16), [ctx.mpf(k) for k in range(1, 41)]
+    grid = Grid(ctx, 16)
+    many = [ctx.mpf(k) for k in range(1, 41)]
     total = ctx.fsum(many)
     one = 1 + 15 * ctx.eps
     for masses in ([(w, ctx.mpf(2)) for w in many], [(w, 2 * one if w == 7 else ctx.mpf(2)) for w in many]):

@@ -46,19 +46,23 @@ def test_the_blur_is_a_brownian_motion_in_four_dimensions(variance: float) -> No
     exact = ncx2.cdf(np.exp(x / 2) * 16 / variance, 4, 16 / variance)
     assert np.abs(kernel_cdf(x, variance) - exact).max() < 0.5 * (variance / 16) ** 1.5
     fine = np.linspace(-9, 9, 40001) * math.sqrt(variance)
-    mass, middle = np.diff(kernel_cdf(fine, variance)), (fine[1:] + fine[:-1]) / 2
+    mass = np.diff(kernel_cdf(fine, variance))
+    middle = (fine[1:] + fine[:-1]) / 2
     assert mass @ middle == pytest.approx(variance / 4, rel=1e-3)
     assert mass @ np.exp(-middle / 2) == pytest.approx(1, abs=0.1 * (variance / 16) ** 1.5 + 1e-9)
 
 
 def test_the_diffusion_that_keeps_the_measure_de_has_this_blur() -> None:
     """It drifts by a quarter of its variance, and exp(-s / 2) has no bias."""
-    rng, n, n_steps = np.random.default_rng(7), 100_000, 200
+    rng = np.random.default_rng(7)
+    n = 100_000
+    n_steps = 200
     e, variance = np.full(n, 1e4), 0.05  # of log E, 2 D / E^2 at the start
     for _ in range(n_steps):
         step = variance / n_steps
         e = e + 0.75 * e**0.5 * step * 100 + np.sqrt(e**1.5 * step * 100) * rng.standard_normal(n)
-    s, places = np.sort(np.log(e / 1e4)), (np.arange(n) + 0.5) / n
+    s = np.sort(np.log(e / 1e4))
+    places = (np.arange(n) + 0.5) / n
     assert np.abs(kernel_cdf(s, variance) - places).max() < 1.95 / math.sqrt(n)  # p = 1e-3
     gaussian = norm.cdf(s, variance / 4, math.sqrt(variance))
     assert np.abs(gaussian - places).max() > 1.95 / math.sqrt(n)
@@ -100,7 +104,8 @@ def test_phase_volume_is_kept(name: str, size: float, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize("name", deep_but(CYCLES, "moving-cap", "fixed-cap-clockwise"))
 def test_great_energies_have_the_adiabatic_theory(name: str) -> None:
     scene = load(name)
-    found, right = at_energy(scene, 1e20), theory.predict(scene, 10)
+    found = at_energy(scene, 1e20)
+    right = theory.predict(scene, 10)
     assert found.p_nc == pytest.approx(float(right.p_nc), abs=1e-6)
     assert found.mean_s == pytest.approx(float(right.m1), abs=5e-6)
     assert math.sqrt(found.variance_s) == pytest.approx(float(right.sd), rel=1e-4)
@@ -112,7 +117,8 @@ def test_great_energies_have_the_adiabatic_theory(name: str) -> None:
 def test_figures_fit_the_drawn_cycles() -> None:
     found = at_energy(load("fixed-cap-clockwise"), 1e7)
     s = found.draw(2, 400_000, 5)
-    first, second = s[:, 0], s[:, 1] - s[:, 0]
+    first = s[:, 0]
+    second = s[:, 1] - s[:, 0]
     error = math.sqrt(found.variance_s / len(first))
     assert abs(first.mean() - found.mean_s) < 4 * error
     assert first.var() == pytest.approx(found.variance_s, rel=0.01)
@@ -124,9 +130,11 @@ def test_figures_fit_the_drawn_cycles() -> None:
 
 
 def test_reversed_cycles_turn_the_lags_and_keep_the_diffusion() -> None:
-    forward, backward = load("fixed-cap-anticlockwise"), load("fixed-cap-clockwise")
+    forward = load("fixed-cap-anticlockwise")
+    backward = load("fixed-cap-clockwise")
     t = np.array([0.06, 0.125, 0.2, 0.3, 0.45, 0.55, 0.7, 0.9])
-    a, b = rates_at(forward, t), rates_at(backward, 1 - t)
+    a = rates_at(forward, t)
+    b = rates_at(backward, 1 - t)
     assert np.allclose(a.diffusion, b.diffusion)
     assert np.allclose(a.lag, -b.lag)
     assert np.allclose(a.square, b.square)
@@ -135,7 +143,8 @@ def test_reversed_cycles_turn_the_lags_and_keep_the_diffusion() -> None:
 
 @pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-anticlockwise"])
 def test_the_mean_kick_is_eq_de_without_the_flux(name: str) -> None:
-    scene, h = load(name), 1e-5
+    scene = load(name)
+    h = 1e-5
     for t in (0.1, 0.3, 0.6, 0.9):
         t *= 2 * math.pi if name == "moving-cap" else 1
         log_e = theory.chaotic_zone(scene, [t - h, t + h]).log_energy
@@ -247,7 +256,8 @@ def by_every_fifth_phase(measured: Mushroom, sought: Mushroom) -> bool:
 
 def that_swings_between_phases() -> Mushroom:
     """Return the moving cap, its depth swung by waves that vanish at every fifth of PHASES."""
-    times, k = 2 * math.pi * PHASES[::5], np.arange(1, 17)
+    times = 2 * math.pi * PHASES[::5]
+    k = np.arange(1, 17)
     waves = np.concatenate([np.cos(np.outer(times, k)), np.sin(np.outer(times, k))], axis=1)
     swing = 0.05 * np.linalg.svd(waves)[2][-1]
     sin = swing[16:] + np.array([-0.5, *[0.0] * 15])
@@ -308,7 +318,8 @@ def test_a_measured_cycle_is_known_however_it_is_written(name, written):
 
 def by_its_width(name):
     """Return a scene whose mouth is told as w, not nu: w = nu r, and r moves."""
-    scene, wave = load(name), Fourier(mean=0.6, omega=1.0, cos=(0.4,), sin=(0.3, 0.1))
+    scene = load(name)
+    wave = Fourier(mean=0.6, omega=1.0, cos=(0.4,), sin=(0.3, 0.1))
     return Mushroom(r=scene.r, h=scene.h, w=wave if name == "moving-cap" else scene.r, slope=scene.slope)
 
 
@@ -388,7 +399,8 @@ def test_blocks_are_of_twice_the_memory_that_diffusion_has(kept: dict[int, float
     diffusion = np.zeros((N_TIMES, len(MEMORIES)))
     for k, weight in kept.items():
         diffusion[:, k] = 1e-3 * weight
-    none, zero = np.zeros((N_TIMES, len(SPEEDS))), np.zeros(N_TIMES)
+    none = np.zeros((N_TIMES, len(SPEEDS)))
+    zero = np.zeros(N_TIMES)
     rates_there = rates.RatesAt(diffusion, none, none, none)
     crossing, hardly = np.full(N_TIMES, np.pi), np.full(N_TIMES, 1e-9)  # kicks have the sign of the shear
     times = (0.0, 1 / N_TIMES)

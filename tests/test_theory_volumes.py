@@ -49,7 +49,8 @@ def share_of_island(ctx: Any, nu: Any) -> Any:
 
 def worst_of_small_islands(share: Callable[..., Any]) -> float:
     """Return the largest relative error, in units of 2^-53, of a share in floats; 0.5 <= nu < 1."""
-    many, found = MPContext(), 0.0
+    many = MPContext()
+    found = 0.0
     many.dps = 80
     for nu in (1 - 2.0**-k * part for k in range(1, 54) for part in (1.0, 0.5625, 0.71875)):
         if nu < 1:
@@ -60,8 +61,10 @@ def worst_of_small_islands(share: Callable[..., Any]) -> float:
 def test_a_small_island_is_known_as_well_as_a_large_one() -> None:
     assert worst_of_small_islands(delta) < 12
     assert worst_of_small_islands(share_of_island) > 1e10
-    few, many = MPContext(), MPContext()
-    few.dps, many.dps = 30, 100
+    few = MPContext()
+    many = MPContext()
+    few.dps = 30
+    many.dps = 100
     for nu in (1 - few.mpf(10) ** -k for k in (0.7, 1, 8, 16, 29)):
         truth = share_of_island(many, many.mpf(nu))
         assert abs(many.mpf(delta(few, nu)) / truth - 1) < many.mpf(10) ** -29
@@ -77,9 +80,12 @@ def test_delta_slope_is_its_derivative(ctx: Any) -> None:
 
 @pytest.mark.parametrize("nu", [0.1, 0.3, 0.65, 0.9])
 def test_delta_is_the_captured_share_of_phase_points(nu: float) -> None:
-    n, r = 400_000, 1.3
+    n = 400_000
+    r = 1.3
     rng = np.random.Generator(np.random.Philox(20140601))
-    rho, psi, direction = r * np.sqrt(rng.random(n)), np.pi * rng.random(n), 2 * np.pi * rng.random(n)
+    rho = r * np.sqrt(rng.random(n))
+    psi = np.pi * rng.random(n)
+    direction = 2 * np.pi * rng.random(n)
     x, y = rho * np.cos(psi), rho * np.sin(psi)
     captured = np.abs(sin_phi_hat(np, x, y, np.cos(direction), np.sin(direction), r)) > nu
     expected = delta(fp, nu)
@@ -108,7 +114,9 @@ def test_volumes_of_a_scene_agree_in_floats_and_in_many_digits(ctx: Any) -> None
 
 def test_moving_cap_volumes_are_the_formulas_of_the_scene(ctx: Any) -> None:
     t = ctx.mpf("1.1")
-    r, h, nu = 1 + ctx.sin(t) / 2, 1 - ctx.sin(t) / 2, ctx.mpf(0.6) + ctx.mpf(0.4) * ctx.cos(t)
+    r = 1 + ctx.sin(t) / 2
+    h = 1 - ctx.sin(t) / 2
+    nu = ctx.mpf(0.6) + ctx.mpf(0.4) * ctx.cos(t)
     found = volumes_at(ctx, load("moving-cap"), t)
     assert abs(found.nu - nu) < ctx.mpf(10) ** -48
     assert abs(found.v_cha - v_cha(ctx, r, nu * r, h, ctx.mpf(0.1111))) < ctx.mpf(10) ** -46
@@ -117,7 +125,8 @@ def test_moving_cap_volumes_are_the_formulas_of_the_scene(ctx: Any) -> None:
 @pytest.mark.parametrize("nu", [1.0, 0.3, 1e-5, 1e-12, 1e-40, 1e-300])
 def test_the_chaotic_zone_keeps_its_digits_however_narrow_the_mouth(ctx: Any, nu: float) -> None:
     """Cap and stem less the island left none of them where the island fills the cap within rounding."""
-    w, h = ctx.mpf(nu), ctx.mpf(0.25)
+    w = ctx.mpf(nu)
+    h = ctx.mpf(0.25)
     strip = ctx.quad(lambda s: ctx.sqrt(1 - (w * s) ** 2), [0, 1])
     zone = 4 * ctx.pi * w * strip + v_stem(ctx, w, h, 0)
     assert abs(v_cha(ctx, ctx.one, w, h, 0) / zone - 1) < ctx.mpf(10) ** -40
@@ -126,7 +135,9 @@ def test_the_chaotic_zone_keeps_its_digits_however_narrow_the_mouth(ctx: Any, nu
 
 
 def test_sin_phi_hat_is_the_incidence_angle_on_the_arc() -> None:
-    r, psi, phi = 1.4, 0.8, 0.3
+    r = 1.4
+    psi = 0.8
+    phi = 0.3
     speed = 7.0
     x, y = r * math.cos(psi), r * math.sin(psi)
     vx, vy = speed * math.cos(psi - phi), speed * math.sin(psi - phi)
@@ -140,10 +151,13 @@ BREATHING = Mushroom(
 
 def captives(speed: float, n: int) -> list[State]:
     """Return particles of the island of BREATHING, |sin phi_hat| > 0.55, at t = 0."""
-    random, r = np.random.default_rng(7), float(BREATHING.laws["r"].value(fp, 0.0))
+    random = np.random.default_rng(7)
+    r = float(BREATHING.laws["r"].value(fp, 0.0))
     found: list[State] = []
     while len(found) < n:
-        x, y, turn = random.uniform(-r, r), random.uniform(0, r), random.uniform(0, 2 * math.pi)
+        x = random.uniform(-r, r)
+        y = random.uniform(0, r)
+        turn = random.uniform(0, 2 * math.pi)
         vx, vy = speed * math.cos(turn), speed * math.sin(turn)
         if math.hypot(x, y) < 0.99 * r and abs(sin_phi_hat(fp, x, y, vx, vy, r)) > 0.55:
             found.append(State(0.0, x, y, vx, vy))
@@ -152,7 +166,8 @@ def captives(speed: float, n: int) -> list[State]:
 
 def drifts(t: float, speed: float, of: Callable[..., float]) -> float:
     """Return the largest change by time t of a function of (x, y, vx, vy, r)."""
-    starts, largest = captives(speed, 40), 0.0
+    starts = captives(speed, 40)
+    largest = 0.0
     r0, r1 = (float(BREATHING.laws["r"].value(fp, at)) for at in (0.0, t))
     for start, end in zip(starts, fast.flow(BREATHING, starts, t).outcomes, strict=True):
         assert isinstance(end, Horizon)
@@ -217,7 +232,8 @@ def test_the_rates_integrate_to_the_energies_of_the_cycle() -> None:
     nowhere = ctx.quad(chaotic, [0, ctx.pi, 2 * ctx.pi], maxdegree=5)
     assert abs(nowhere - predict(load("moving-cap")).log_e_nc) < 1e-9
     captured = capture_curve(load("moving-cap"), 9)
-    t_in, t_out = ctx.mpf(captured.t_in[4]), ctx.mpf(captured.t_out[4])
+    t_in = ctx.mpf(captured.t_in[4])
+    t_out = ctx.mpf(captured.t_out[4])
     free = ctx.quad(chaotic, [0, t_in], maxdegree=4) + ctx.quad(chaotic, [t_out, 2 * ctx.pi], maxdegree=4)
     held = ctx.quad(island, [t_in, t_out], maxdegree=5)
     assert float(free + held) == pytest.approx(captured.s[4], abs=1e-8)

@@ -127,4 +127,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    if sys.argv[1:]:
+        print(f"{' '.join(sys.argv[1:])!r} is no option: it has none", file=sys.stderr)
+        sys.exit(2)
     main()

@@ -198,6 +198,9 @@ if __name__ == "__main__":
     if sys.argv[1:] == ["--table"]:
         print(page(json.loads((DATA / "kill-matrix.json").read_text("utf-8"))), end="")
         sys.exit(0)
+    if sys.argv[1:]:
+        print(f"{' '.join(sys.argv[1:])!r} is no option: --table is the only one", file=sys.stderr)
+        sys.exit(2)
     try:
         sys.exit(run())
     except BadInput as error:

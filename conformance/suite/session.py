@@ -93,6 +93,7 @@ class Session(AbstractContextManager["Session"]):
         introduction: what the implementation said of itself, once opened.
         n_restarts: fresh processes that were needed so far.
         sent: the last line that was sent, whatever it asked.
+        seconds: that the last answer took to come; 0 of a function, of which no time is kept.
         stderr: what it wrote to standard error, bounded.
         command: as results name it.
         limits: time and restarts.
@@ -112,7 +113,7 @@ class Session(AbstractContextManager["Session"]):
         total = self.limits.total
         self._deadline = math.inf if total is None else time.monotonic() + total
         self.introduction: Introduction | None = None
-        self.n_restarts, self.sent = 0, b""
+        self.n_restarts, self.sent, self.seconds = 0, b"", 0.0
         self.stderr = Transcript()
 
     def __exit__(
@@ -218,8 +219,11 @@ class Session(AbstractContextManager["Session"]):
     def _exchange(self, line: bytes) -> bytes:
         assert self._process is not None
         self.sent = line
-        left = max(0.0, self._deadline - time.monotonic())
-        return self._process.exchange(line, min(self.limits.timeout, left))
+        begin = time.monotonic()
+        left = max(0.0, self._deadline - begin)
+        answer = self._process.exchange(line, min(self.limits.timeout, left))
+        self.seconds = time.monotonic() - begin if isinstance(self._process, Process) else 0.0
+        return answer
 
     def _restart(self) -> None:
         if self.n_restarts >= self.limits.restarts:

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import config, types
+from numba import types
 
-from fast.kernel.compiling import kept, kernel, packed, part
+from fast.kernel.compiling import in_kernels, kept, kernel, packed, part
 from fast.kernel.numba_internals import intrinsic
 from scene.precision import decimals
 
@@ -52,7 +52,8 @@ def _compiled_fma(_context: Any, a: Any, b: Any, c: Any) -> Any:
     return types.float64(types.float64, types.float64, types.float64), generate
 
 
-def _exact_fma(a: float, b: float, c: float) -> float:
+def fma(a: float, b: float, c: float) -> float:
+    """Return a b + c, rounded once; in kernels one instruction."""
     rough = a * b + c
     if not np.isfinite(rough):
         return rough
@@ -60,8 +61,9 @@ def _exact_fma(a: float, b: float, c: float) -> float:
     return float(exact) if exact else rough  # a zero with its sign
 
 
-# a b + c, rounded once. Without the compiler the kernels are plain Python, which tests compare.
-fma = _exact_fma if config.DISABLE_JIT else _compiled_fma
+@in_kernels(fma)
+def _fused(a: Any, b: Any, c: Any) -> Any:
+    return lambda a, b, c: _compiled_fma(a, b, c)
 
 
 @kernel

@@ -20,7 +20,7 @@ import llvmlite
 import numba
 from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 from numba import config, njit
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 
 from fast.kernel import numba_internals
 from fast.kernel.numba_internals import UNCOUNTED, UNWRAPPED, cache_folder, is_compiled, is_newly_compiled
@@ -117,6 +117,14 @@ def _load_or_compile(entry: Any, compile_or_load: Callable[[Any], Any], signatur
     return found
 
 
+def is_at_hand(entry: Any) -> bool:
+    """Tell whether an entry is compiled, in this process or on disk, for some types of arguments."""
+    if config.DISABLE_JIT or entry.signatures:
+        return True
+    files = _files_of(entry)
+    return bool(files) and _is_sealed(files)
+
+
 def _files_of(entry: Any) -> list[Path]:
     """Return the files that an entry is kept in, the index last."""
     name = entry.py_func.__qualname__.split(">.")[-1]  # of one in a function numba drops the brackets
@@ -142,15 +150,6 @@ def _seal(files: list[Path], index: bytes) -> bytes:
     return digest.digest()
 
 
-def _called(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    return function(*arguments)
-
-
-def caller(signature: Any) -> Callable[..., Any]:
-    """Return a function for kernels that calls what lies at an address with a tuple of arguments."""
-    return _called if config.DISABLE_JIT else numba_internals.caller_by_address(signature)
-
-
 # A function of its own, compiled where compiled functions call it. Python, which calls the function as it is
 # written, has nothing compiled for it.
 kernel: Callable[[F], F] = register_jitable(**HOW)
@@ -160,11 +159,37 @@ packed: Callable[[F], F] = register_jitable(forceinline=True, **HOW)
 part: Callable[[F], F] = njit(**HOW, inline="always")
 
 
-def _no_registers() -> None:
-    pass
+def in_kernels(function: Callable[..., Any]) -> Callable[[F], F]:
+    """Return a decorator for what kernels run in place of a function, which Python runs as it is written.
+
+    It decorates a function of the same arguments, which returns the function that kernels run.
+    """
+    return overload(function, inline="always", strict=False, jit_options=HOW)  # type: ignore[no-any-return]
 
 
-# Asks, in the function that calls it, for the widest registers there are: left to itself the compiler takes
-# 256 bits on machines that have 512. The answers are the same bits. A loop is packed by itself and again
-# where it is inlined, which keeps only the outer function's attributes: both ask.
-widest_registers = _no_registers if config.DISABLE_JIT else numba_internals.widest_registers
+def caller(signature: Any) -> Callable[..., Any]:
+    """Return a function that calls a function, for kernels its address, with a tuple of arguments."""
+    call_address = numba_internals.caller_by_address(signature)
+
+    def call(function: Any, arguments: tuple[Any, ...]) -> Any:
+        return function(*arguments)
+
+    @in_kernels(call)
+    def compiled(function: Any, arguments: Any) -> Any:
+        return lambda function, arguments: call_address(function, arguments)
+
+    return call
+
+
+def widest_registers() -> None:
+    """Ask, in the function that calls this, for the widest registers there are.
+
+    Left to itself the compiler takes 256 bits on machines that have 512. The answers are the same bits. A
+    loop is packed by itself and again where it is inlined, which keeps only the outer function's attributes:
+    both ask.
+    """
+
+
+@in_kernels(widest_registers)
+def _ask_for_registers() -> Any:
+    return lambda: numba_internals.widest_registers()

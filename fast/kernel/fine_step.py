@@ -15,14 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.kernel.arithmetic import add, div, fine_sine_cosine, mul, sub, times
+from fast.kernel.arithmetic import add, div, mul, sub, times
 from fast.kernel.compiling import kept, kernel
-from fast.kernel.laws import leg_at, set_anchors
+from fast.kernel.laws import ZERO, fine_increment, fine_law, set_anchors
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, ARC, BANG_BANG, BASE, BEYOND_ARC, DEPTH, FLOOR, KIND, KNOTS, LEVEL,
-    NEAR_TANGENCY, NO_WALL, N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, PHASE,
-    PHASE_ERROR, RADIUS, RIGHT, SHARED, SLOPE, TOO_LATE, WIDTH, Particle, is_hit,
+    ARC, BASE, BEYOND_ARC, DEPTH, FLOOR, NEAR_TANGENCY, NO_WALL, PHASE,
+    PHASE_ERROR, RADIUS, RIGHT, SLOPE, TOO_LATE, WIDTH, Particle, is_hit,
 )  # fmt: skip
 from fast.kernel.scalar_step import first_event
 from fast.kernel.walls import crossed_wall
@@ -30,7 +29,6 @@ from fast.kernel.walls import crossed_wall
 MAX_CORRECTIONS = 8
 ROUNDED = 2.0**-57  # what rounding a state takes from a residual: 64 times this (fast.kernel.walls.law_size)
 SETTLED, LOOSE = 2.0**-102, 2.0**-80  # relative corrections: done; too coarse for an answer
-ZERO = (0.0, 0.0)
 
 
 class FineState(NamedTuple):
@@ -44,89 +42,12 @@ class FineState(NamedTuple):
 
 
 @kernel
-def frequency(laws, row):
-    """Return a Fourier law's omega."""
-    return laws[row, OMEGA], laws[SHARED, OMEGA_LOW]
-
-
-@kernel
-def phase(laws, row, k, t):
-    """Return k omega t."""
-    return mul(times(k, frequency(laws, row)), t)
-
-
-@kernel
-def time_after(laws, row, i, n_periods, t):
-    """Return the time since a knot of a bang-bang law, so many periods on.
-
-    Knot and periods are added first: t may be short beside both.
-    """
-    periods = times(n_periods, (laws[row, PERIOD], laws[row, PERIOD_LOW]))
-    return sub(t, add((laws[row, KNOTS + i], 0.0), periods))
-
-
-@kernel
-def half_leg_at(laws, row, t):
-    """Return where in a bang-bang law a time lies: half-leg, periods gone by, time from the nearer knot."""
-    i, n_periods = leg_at(laws, row, t[0], t[1])
-    u, rest = time_after(laws, row, i, n_periods, t), time_after(laws, row, i + 1, n_periods, t)
-    if add(u, rest)[0] < 0.0:
-        return 2 * i, n_periods, u
-    return 2 * i + 1, n_periods, rest
-
-
-@kernel
-def bend_of(laws, row, half_leg):
-    """Return the second derivative in a half-leg."""
-    n, i = int(laws[row, N_KNOTS]), half_leg // 2
-    sign = -1.0 if half_leg % 2 else 1.0
-    return sign * laws[row, KNOTS + 2 * n + i], sign * laws[row, KNOTS + 3 * n + i]
-
-
-@kernel
-def law(laws, row, t):
-    """Return a law's value and derivative; a constant law is a Fourier law without harmonics."""
-    if laws[row, KIND] == BANG_BANG:
-        half_leg, _, u = half_leg_at(laws, row, t)
-        a = bend_of(laws, row, half_leg)
-        knot = laws[row, KNOTS + int(laws[row, N_KNOTS]) + (half_leg + 1) // 2]
-        return add((knot, 0.0), times(0.5, mul(a, mul(u, u)))), mul(a, u)
-    n = int(laws[row, N_HARMONICS])
-    f, rate = (laws[row, LEVEL], 0.0), ZERO
-    for k in range(1, n + 1):
-        sine, cosine, _ = fine_sine_cosine(phase(laws, row, float(k), t))
-        a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
-        f = add(f, add(times(a, cosine), times(b, sine)))
-        rate = add(rate, times(float(k), sub(times(b, cosine), times(a, sine))))
-    return f, mul(frequency(laws, row), rate)
-
-
-@kernel
-def increment(laws, row, t, s):
-    """Return a law's f(t + s) - f(t), without cancellation."""
-    if laws[row, KIND] == BANG_BANG:
-        half_leg, n_periods, u = half_leg_at(laws, row, t)
-        later, n_later, _ = half_leg_at(laws, row, add(t, s))
-        if later == half_leg and n_later == n_periods:
-            return mul(mul(bend_of(laws, row, half_leg), s), add(u, times(0.5, s)))
-        return sub(law(laws, row, add(t, s))[0], law(laws, row, t)[0])
-    n, change = int(laws[row, N_HARMONICS]), ZERO
-    for k in range(1, n + 1):
-        half = phase(laws, row, 0.5 * k, s)
-        sine, cosine, _ = fine_sine_cosine(add(phase(laws, row, float(k), t), half))
-        across, _, _ = fine_sine_cosine(half)
-        a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
-        change = add(change, mul(times(2.0, across), sub(times(b, cosine), times(a, sine))))
-    return change
-
-
-@kernel
 def half_width(scene, t):
     """Return w and w'."""
-    w, rate = law(scene.laws, WIDTH, t)
+    w, rate = fine_law(scene.laws, WIDTH, t)
     if not scene.is_relative:
         return w, rate
-    r, r_rate = law(scene.laws, RADIUS, t)
+    r, r_rate = fine_law(scene.laws, RADIUS, t)
     return mul(w, r), add(mul(rate, r), mul(w, r_rate))
 
 
@@ -135,21 +56,21 @@ def increase(wall, s, state, scene):
     """Return f(s) - f(0) of a wall along the flight from the state p."""
     t, x, y, vx, vy = state
     if wall == ARC:
-        d_r = increment(scene.laws, RADIUS, t, s)
-        r, _ = law(scene.laws, RADIUS, t)
+        d_r = fine_increment(scene.laws, RADIUS, t, s)
+        r, _ = fine_law(scene.laws, RADIUS, t)
         q = add(mul(x, vx), mul(y, vy))
         v2 = add(mul(vx, vx), mul(vy, vy))
         return sub(mul(d_r, add(times(2.0, r), d_r)), mul(s, add(times(2.0, q), mul(s, v2))))
     if wall == FLOOR:
-        return add(mul(vy, s), increment(scene.laws, DEPTH, t, s))
-    d_w = increment(scene.laws, WIDTH, t, s)
+        return add(mul(vy, s), fine_increment(scene.laws, DEPTH, t, s))
+    d_w = fine_increment(scene.laws, WIDTH, t, s)
     if scene.is_relative:
-        d_r = increment(scene.laws, RADIUS, t, s)
-        r, _ = law(scene.laws, RADIUS, t)
-        nu, _ = law(scene.laws, WIDTH, t)
+        d_r = fine_increment(scene.laws, RADIUS, t, s)
+        r, _ = fine_law(scene.laws, RADIUS, t)
+        nu, _ = fine_law(scene.laws, WIDTH, t)
         d_w = add(mul(d_w, add(r, d_r)), mul(nu, d_r))
-    m, _ = law(scene.laws, SLOPE, t)
-    tilt = mul(increment(scene.laws, SLOPE, t, s), add(y, mul(vy, s)))
+    m, _ = fine_law(scene.laws, SLOPE, t)
+    tilt = mul(fine_increment(scene.laws, SLOPE, t, s), add(y, mul(vy, s)))
     outward = times(1.0 if wall == RIGHT else -1.0, vx)
     return add(add(d_w, tilt), mul(s, sub(mul(m, vy), outward)))
 
@@ -159,11 +80,11 @@ def residual(wall, state, scene):
     """Return f(0) of a wall."""
     t, x, y, _, _ = state
     if wall == ARC:
-        r, _ = law(scene.laws, RADIUS, t)
+        r, _ = fine_law(scene.laws, RADIUS, t)
         return sub(mul(r, r), add(mul(x, x), mul(y, y)))
     if wall == FLOOR:
-        return add(y, law(scene.laws, DEPTH, t)[0])
-    m, _ = law(scene.laws, SLOPE, t)
+        return add(y, fine_law(scene.laws, DEPTH, t)[0])
+    m, _ = fine_law(scene.laws, SLOPE, t)
     across = times(1.0 if wall == RIGHT else -1.0, x)
     return sub(add(half_width(scene, t)[0], mul(m, y)), across)
 
@@ -173,14 +94,14 @@ def gradient(wall, state, scene):
     """Return f_x, f_y and f' of a wall at a state on it."""
     t, x, y, vx, vy = state
     if wall == ARC:
-        r, rate = law(scene.laws, RADIUS, t)
+        r, rate = fine_law(scene.laws, RADIUS, t)
         push = sub(mul(r, rate), add(mul(x, vx), mul(y, vy)))
         return times(-2.0, x), times(-2.0, y), times(2.0, push)
     if wall == FLOOR:
-        return ZERO, (1.0, 0.0), add(vy, law(scene.laws, DEPTH, t)[1])
+        return ZERO, (1.0, 0.0), add(vy, fine_law(scene.laws, DEPTH, t)[1])
     if wall == BASE:
         return ZERO, (1.0, 0.0), vy
-    m, m_rate = law(scene.laws, SLOPE, t)
+    m, m_rate = fine_law(scene.laws, SLOPE, t)
     side = -1.0 if wall == RIGHT else 1.0
     rate = add(half_width(scene, t)[1], mul(m_rate, y))
     return (side, 0.0), m, add(rate, add(mul(m, vy), times(side, vx)))

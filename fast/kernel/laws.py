@@ -10,21 +10,31 @@ its speed is that time's multiple, so that time must be right relative to itself
 knots are written in. All Fourier laws of a scene share their omega, so the sines and cosines of the harmonics
 are found once for all of them, at the event (row PHASE) and for the turn since then, at one s (row TURN).
 
+`row_of` lays out a law as the numbers that all this reads. What a path in pairs of floats asks of a law is
+at the end (`fine_law`, `fine_increment`). So a kind of law is known in this file alone; lanes take those
+kinds that are IN_LANES, and the scalar step takes the others.
+
 A size is used as if its value were right to a unit or two in its last place. Its terms are known to
 2^-62 of themselves, which is enough where they leave more than a small part of the mean; where they cancel
 further, and a mouth all but closes, the phases are found again to twice as many digits (`is_cancelled`).
 """
 
+from fractions import Fraction
+from itertools import pairwise, zip_longest
+
 import numpy as np
 
 from fast.kernel.arithmetic import (
+    HALF_PI,
     MAX_QUADRANT,
     SAFETY,
     TWO_OVER_PI,
+    add,
     beyond_first_order,
     fine_sine_cosine,
     mul,
     sine_cosine,
+    split,
     sub,
     times,
     two_product,
@@ -37,10 +47,45 @@ from fast.kernel.records import (  # isort: skip
     LEVEL, N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, PHASE, PHASE_ERROR, RADIUS, RATE,
     ROOM, ROOM_LOW, SHARED, SINE, SINE_LOW, SLOPE, TERMS, TURN, TURN_TIME, VALUE, VALUE_LOW, WIDTH,
 )  # fmt: skip
+from scene import BangBang, Fourier, Law
+from scene.pieces import Period
 
 # Part of its mean below which a size's terms cancel so far that their rounding shows in it. The terms of one
 # that stays positive add up to at most 46 times its mean (sixteen harmonics, each below twice the mean).
 CANCELLED = 2.0**-4
+ZERO = (0.0, 0.0)
+# Kinds that lanes know, as waves or as pieces. A scene with a law of another kind is left to the scalar step.
+IN_LANES = (CONSTANT, FOURIER, BANG_BANG)
+
+
+def omega_of(cycle: Period) -> tuple[float, float]:
+    """Return a frequency as a sum of two floats: exact if given, else 2 pi / period to 2^-106."""
+    if cycle.omega is not None:
+        return cycle.omega, 0.0
+    assert cycle.length is not None
+    high, low = split(4 * HALF_PI / cycle.length)
+    return high, low
+
+
+def row_of(law: Law) -> list[float]:
+    """Lay out a law as a row of `laws`: the only function of this package that asks for its kind."""
+    if law.cycle is None:
+        return [CONSTANT, law.level, 0.0, 0.0]
+    match law:
+        case Fourier():
+            harmonics = list(zip_longest(law.cos, law.sin, fillvalue=0.0))
+            cos, sin = zip(*harmonics, strict=True)
+            return [FOURIER, law.mean, omega_of(law.cycle)[0], len(harmonics), *cos, *sin]
+        case BangBang():
+            times, values = zip(*law.knots, strict=True)
+            accelerations = [
+                4 * (Fraction(v1) - Fraction(v0)) / (Fraction(t1) - Fraction(t0)) ** 2
+                for (t0, v0), (t1, v1) in pairwise(law.knots)
+            ] + [Fraction(0)]  # one for every knot keeps the columns simple
+            highs, lows = zip(*map(split, accelerations), strict=True)
+            period, period_low = split(law.length)
+            return [BANG_BANG, 0.0, period, len(times), period_low, *times, *values, *highs, *lows]
+    raise TypeError(f"{type(law).__name__}: fast has no kernel for this kind of law")
 
 
 @part
@@ -358,3 +403,81 @@ def rest(laws, anchors, row, s):
         i = j // 2
         room += 0.5 * (laws[row, KNOTS + i + 1] - laws[row, KNOTS + i])
     return max(room - SAFETY * (room + left), 0.0)
+
+
+@kernel
+def fine_frequency(laws, row):
+    """Return a Fourier law's omega."""
+    return laws[row, OMEGA], laws[SHARED, OMEGA_LOW]
+
+
+@kernel
+def fine_phase(laws, row, k, t):
+    """Return k omega t."""
+    return mul(times(k, fine_frequency(laws, row)), t)
+
+
+@kernel
+def fine_time_after(laws, row, i, n_periods, t):
+    """Return the time since a knot of a bang-bang law, so many periods on.
+
+    Knot and periods are added first: t may be short beside both.
+    """
+    periods = times(n_periods, (laws[row, PERIOD], laws[row, PERIOD_LOW]))
+    return sub(t, add((laws[row, KNOTS + i], 0.0), periods))
+
+
+@kernel
+def fine_half_leg(laws, row, t):
+    """Return where in a bang-bang law a time lies: half-leg, periods gone by, time from the nearer knot."""
+    i, n_periods = leg_at(laws, row, t[0], t[1])
+    u = fine_time_after(laws, row, i, n_periods, t)
+    rest = fine_time_after(laws, row, i + 1, n_periods, t)
+    if add(u, rest)[0] < 0.0:
+        return 2 * i, n_periods, u
+    return 2 * i + 1, n_periods, rest
+
+
+@kernel
+def fine_bend(laws, row, half_leg):
+    """Return the second derivative in a half-leg."""
+    n, i = int(laws[row, N_KNOTS]), half_leg // 2
+    sign = -1.0 if half_leg % 2 else 1.0
+    return sign * laws[row, KNOTS + 2 * n + i], sign * laws[row, KNOTS + 3 * n + i]
+
+
+@kernel
+def fine_law(laws, row, t):
+    """Return a law's value and derivative; a constant law is a Fourier law without harmonics."""
+    if laws[row, KIND] == BANG_BANG:
+        half_leg, _, u = fine_half_leg(laws, row, t)
+        a = fine_bend(laws, row, half_leg)
+        knot = laws[row, KNOTS + int(laws[row, N_KNOTS]) + (half_leg + 1) // 2]
+        return add((knot, 0.0), times(0.5, mul(a, mul(u, u)))), mul(a, u)
+    n = int(laws[row, N_HARMONICS])
+    f, rate = (laws[row, LEVEL], 0.0), ZERO
+    for k in range(1, n + 1):
+        sine, cosine, _ = fine_sine_cosine(fine_phase(laws, row, float(k), t))
+        a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
+        f = add(f, add(times(a, cosine), times(b, sine)))
+        rate = add(rate, times(float(k), sub(times(b, cosine), times(a, sine))))
+    return f, mul(fine_frequency(laws, row), rate)
+
+
+@kernel
+def fine_increment(laws, row, t, s):
+    """Return a law's f(t + s) - f(t), without cancellation."""
+    if laws[row, KIND] == BANG_BANG:
+        half_leg, n_periods, u = fine_half_leg(laws, row, t)
+        later, n_later, _ = fine_half_leg(laws, row, add(t, s))
+        if later == half_leg and n_later == n_periods:
+            return mul(mul(fine_bend(laws, row, half_leg), s), add(u, times(0.5, s)))
+        return sub(fine_law(laws, row, add(t, s))[0], fine_law(laws, row, t)[0])
+    n, change = int(laws[row, N_HARMONICS]), ZERO
+    for k in range(1, n + 1):
+        half = fine_phase(laws, row, 0.5 * k, s)
+        sine, cosine, _ = fine_sine_cosine(add(fine_phase(laws, row, float(k), t), half))
+        across, _, _ = fine_sine_cosine(half)
+        a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
+        change = add(change, mul(times(2.0, across), sub(times(b, cosine), times(a, sine))))
+    return change

@@ -6,11 +6,14 @@ with branches, and `fly_alone` tells `land` in each branch which wall is met, so
 what the others ask for.
 """
 
+from typing import Any
+
 import numpy as np
 
 from fast.kernel.arithmetic import fma
 from fast.kernel.compiling import HOW, kept, packed, part
 from fast.kernel.follow import careful_flight, knows_laws, land_carefully
+from fast.kernel.interpreting import Allowance, as_python
 from fast.kernel.lane_laws import ONE_WAVE, TWO_WAVES, laws_in, look_ahead, set_reference
 
 from fast.kernel.lanes import (  # isort: skip
@@ -20,8 +23,8 @@ from fast.kernel.lanes import (  # isort: skip
 from fast.kernel import rows
 from fast.kernel.records import ANSWER_LOST, STEM, is_hit, particle_at, write_state, write_step
 from fast.kernel.rows import load, particle_of, put_particle
-from fast.kernel.scalar_step import NEAR
-from fast.kernel.worker import FORMS, GENERAL
+from fast.kernel.scalar_step import NEAR, scalar_step
+from fast.kernel.worker import FORMS, GENERAL, careful_at
 
 FIRST = np.int64(0)  # the lane in use
 
@@ -148,3 +151,16 @@ def _path(is_slope_moving, form):
 
 # By whether the slope moves, and by the form of the laws.
 PATHS = {(moves, form): _path(moves, form) for moves in (False, True) for form in FORMS}
+
+
+# How many more collisions Python follows, for each of them.
+ALLOWANCES = {key: Allowance() for key in PATHS}
+
+
+def path_kernel(is_slope_moving: bool, form: int, n_collisions: int) -> tuple[Any, Any]:
+    """Return what follows a path of so many collisions at most, and the scalar step for its worker."""
+    key = is_slope_moving, form
+    kernel, allowance = PATHS[key], ALLOWANCES[key]
+    if allowance.left and allowance.take(n_collisions, kernel, scalar_step):
+        return as_python(kernel), as_python(scalar_step)
+    return kernel, careful_at()

@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 from numba import config, types
 
-from fast.kernel.compiling import kept, kernel, part
+from fast.kernel.compiling import in_kernels, kept, kernel, part
+from fast.kernel.interpreting import Allowance, as_python
 from fast.kernel.numba_internals import function_of
 
 from fast.kernel.records import (  # isort: skip
     ANCHORS_SHAPE, ANSWER_LOST, BAD_QUESTION, HORIZON, OFF_WALL, SHARED, Compiled, FloatArray,
     Integer, Particle, is_lost,
 )  # fmt: skip
-from fast.kernel.scalar_step import GIVEN
-from fast.kernel.worker import run_careful
+from fast.kernel.scalar_step import GIVEN, scalar_step
+from fast.kernel.worker import careful_at, run_careful
 from scene.laws import times_power
 
 # Squares of what is larger overflow.
@@ -29,8 +30,10 @@ LENGTH, TIME = 96, 32  # exponents of a table's size and period in the kernel
 LARGEST_FLOAT = float(np.finfo(np.float64).max)
 
 
-# Python's own ldexp raises where C has infinity.
-ldexp = times_power if config.DISABLE_JIT else math.ldexp
+@in_kernels(times_power)
+def _ldexp(number: Any, exponent: Any) -> Any:
+    # C has infinity where Python's own ldexp raises.
+    return lambda number, exponent: math.ldexp(number, exponent)
 
 
 def pack_scene(scene: Compiled, length: int, time: int | None) -> FloatArray:
@@ -61,10 +64,10 @@ def static_time(length: int, speed: float) -> int:
 def scaled(number: float, exponent: int) -> tuple[float, bool]:
     """Return a number times 2^exponent, and whether that is finite and exact."""
     if -1000 <= exponent <= 1000:  # a product is exact as well, and quicker
-        found = float(number) * ldexp(1.0, exponent)
-        return found, abs(found) < np.inf and found * ldexp(1.0, -exponent) == number
-    found = ldexp(number, exponent)
-    return found, abs(found) < np.inf and ldexp(found, -exponent) == number
+        found = float(number) * times_power(1.0, exponent)
+        return found, abs(found) < np.inf and found * times_power(1.0, -exponent) == number
+    found = times_power(number, exponent)
+    return found, abs(found) < np.inf and times_power(found, -exponent) == number
 
 
 @kernel
@@ -153,3 +156,32 @@ def single_at_once() -> Any:
         return single
     single.compile(SINGLE)
     return function_of(single, SINGLE)
+
+
+def single_by_python(step_at: Any, numbers: FloatArray, *question: Any) -> tuple[Any, ...]:
+    """Answer a question as `single` does, run by Python: the same bits."""
+    # Python refuses to divide by zero where numpy's numbers become infinite or nan, as in kernels.
+    t, x, y, vx, vy, wall, t_end = question
+    state = map(np.float64, (t, x, y, vx, vy))
+    with np.errstate(all="ignore"):
+        found = as_python(single)(step_at, numbers, *state, wall, np.float64(t_end))
+    return int(found[0]), *map(float, found[1:])
+
+
+allowance = Allowance()
+
+
+def asking() -> tuple[Any, Any]:
+    """Return what answers a question, and the scalar step that it is to be given."""
+    if allowance.left and allowance.take(1, single, scalar_step):
+        return single_by_python, as_python(scalar_step)
+    return single_at_once(), careful_at()
+
+
+def share_off_wall(scene: Compiled, particle: Particle) -> float:
+    """Return what `off_wall` does."""
+    if allowance.left and allowance.take(1, off_wall, scalar_step):
+        exact = Particle._make([*map(np.float64, particle[:6]), particle.wall])
+        with np.errstate(all="ignore"):
+            return float(as_python(off_wall)(as_python(scalar_step), scene, exact))
+    return float(off_wall(careful_at(), scene, particle))

@@ -62,7 +62,9 @@ def _audit_paper(options: AuditOptions) -> int:
     """Conduct the audit of the paper's claims."""
     only = options.only
     if only is not None and not only.replace(",", " ").split():
-        raise BadInput(f"--only = {only!r}, must name a claim such as X2; all are checked without it")
+        raise BadInput(
+            f"--only = {only!r}, must name a claim such as X2; all are checked without it"
+        )
     claims = select_claims(only or "")
     size: Size = "full" if options.full else "quick"
     if options.commands:
@@ -72,7 +74,8 @@ def _audit_paper(options: AuditOptions) -> int:
     with writable_folder(options.out) as folder, locked(folder):
         findings = folder / "findings"
         settings = AuditSettings(size, options.seed, options.threads, findings, options.resume)
-        # What a killed audit was writing: no other process writes under these names, as the folder is held.
+        # What a killed audit was writing: no other process writes under these names, as the folder
+        # is held.
         for path in (*folder.glob(".report.*.part"), *folder.glob("findings/.*.finding.*.part")):
             path.unlink(missing_ok=True)
         result = _conduct(folder, settings, claims)
@@ -96,11 +99,15 @@ def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -
                 AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
                 settings,
                 claims=claims,
-                simulate_run=lambda name: partial(follow_run, folder / FOLDER / name, settings.resume),
+                simulate_run=lambda name: partial(
+                    follow_run, folder / FOLDER / name, settings.resume
+                ),
                 progress=lambda run, n_total, n_done: watch_of(run).update(n_done, n_total),
             )
     except (KeyboardInterrupt, OSError) as error:
-        error.add_note("finished parts are in the folder of the report: --resume continues the audit")
+        error.add_note(
+            "finished parts are in the folder of the report: --resume continues the audit"
+        )
         raise
 
 
@@ -113,8 +120,9 @@ def _check_report(folder: Path, wanted: set[str]) -> None:
         return
     if there - wanted:
         raise BadInput(
-            f"output {str(folder)!r} has a report of {len(there)} claims, size = {report.get('size')!r} and"
-            f" seed = {report.get('seed')}; {len(wanted)} are asked for: with --resume none is given up"
+            f"output {str(folder)!r} has a report of {len(there)} claims, size ="
+            f" {report.get('size')!r} and seed = {report.get('seed')}; {len(wanted)} are asked for:"
+            " with --resume none is given up"
         )
 
 
@@ -127,7 +135,7 @@ def spec_of(run: Simulation, seed: int) -> RunSpec:
 
 
 def command(run: Simulation, size: Size, seed: int, folder: Path) -> str:
-    """Return the command that makes a run where an audit in the folder takes it up with --resume."""
+    """Return the command that makes a run where an audit with --resume takes it up."""
     return spec_of(run, seed).command(run.scene, run.n_particles(size), folder / FOLDER / run.name)
 
 
@@ -182,8 +190,9 @@ def follow_run(
 def block_size(spec: RunSpec, n_particles: int, threads: int) -> int:
     """Return how many particles of a new run are kept at a time, at most all of them.
 
-    At the end of a block the lanes wait for its slowest particle. Energies spread with the cycles, so that
-    what takes seconds has too few particles to wait for: each thread has a share of `fast`, at the least.
+    At the end of a block the lanes wait for its slowest particle. Energies spread with the cycles,
+    so that what takes seconds has too few particles to wait for: each thread has a share of `fast`,
+    at the least.
     """
     wanted = max(conduct.block_size(spec, threads), SHARE * threads) * spec.n_cycles
     return min(wanted, conduct.MOST_BLOCK, n_particles)

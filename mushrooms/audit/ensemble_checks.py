@@ -41,8 +41,7 @@ from mushrooms.audit.tolerances import (
     steepest,
 )
 from scene import BadInput, Mushroom
-from scene.geometry import half_width, table_at
-from scene.laws import bounds, values
+from scene.geometry import table_at
 from scene.transforms import backwards
 from theory.finite_energy.one_cycle import TheoryError
 
@@ -165,7 +164,7 @@ def cycle_start(scene: Mushroom) -> float:
 
 def nu_at(scene: Mushroom, times: FloatArray) -> FloatArray:
     """Return w / r at times."""
-    return np.asarray(half_width(fp, scene, times) / values(scene.r, times))
+    return np.asarray(scene.width.values(times) / scene.laws["r"].values(times))
 
 
 def checks(given: GivenEnsemble, theirs: Theory) -> list[Check]:
@@ -304,7 +303,7 @@ def _capture_intervals(given: GivenEnsemble, theirs: Theory) -> Iterator[Check]:
     t_in = given.t_in[np.isfinite(given.t_in)]
     if len(t_in) < FEW:
         return
-    wait = 2 * float(bounds(given.scene.r).highest) / math.sqrt(2 * given.energy)
+    wait = 2 * float(given.scene.laws["r"].bounds().highest) / math.sqrt(2 * given.energy)
     band = seen_late(theirs.capture_cdf, t_in, wait) + theirs.theory_error.captured_mean
     yield fits(TIMES, _some(t_in), theirs.capture_cdf, band=band, scale=0.4)
     if given.t_out is None:

@@ -48,9 +48,8 @@ from mushrooms.figures.style import (
 )
 from mushrooms.orbits import follow
 from scene import Scene, load
-from scene.laws import values
 from scene.pieces import FloatArray
-from scene.tables import Mushroom, laws
+from scene.tables import Mushroom
 
 Panels = Any  # axes as `new_figure` returns them
 N_SUM_BINS = 300
@@ -62,7 +61,7 @@ def loops(panels: Panels) -> None:
     """Draw the cycles in the plane (w, h) of sec. 4.1 and in (V_ell/V_cap, V_cap/V) of sec. 3.5."""
     fixed = load("fixed-cap-anticlockwise")
     moving = load("moving-cap")
-    w, h = (values(laws(fixed)[name], np.linspace(0, 1, N_LOOP + 1)) for name in "wh")
+    w, h = (fixed.laws[name].values(np.linspace(0, 1, N_LOOP + 1)) for name in "wh")
     _loop(panels[0], w, h)
     panels[0].set(xlabel="half-width w", ylabel="depth h", title="fixed cap, anticlockwise")
     titles = ("fixed cap, anticlockwise", "moving cap")

@@ -36,9 +36,7 @@ from mushrooms.audit.tolerances import FloatArray, Mean, mean
 from scene import Fourier, Horizon, Mushroom, State
 from scene.files.writer import write_file
 from scene.geometry import TableAt, table_at
-from scene.laws import value
 from scene.named import scene_named
-from scene.tables import laws
 from theory.finite_energy.rates import (
     FILE,
     MEMORIES,
@@ -98,7 +96,7 @@ def swaying(scene: Mushroom, t: float, period: float) -> tuple[Mushroom, float]:
 
     The proportion is returned too.
     """
-    now = {name: [float(value(fp, law, t, k)) for k in (0, 1)] for name, law in laws(scene).items()}
+    now = {name: [float(law.value(fp, t, k)) for k in (0, 1)] for name, law in scene.laws.items()}
     size = SWAY / max(abs(rate) for _, rate in now.values())
     moved: dict[str, Any] = {
         name: Fourier(mean=at, period=period, sin=(size * rate,)) if rate else at

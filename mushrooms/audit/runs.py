@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from mpmath import fp
 
+from scene.laws import Law
 from scene.named import scene_named
 from scene.tables import Scene
 
@@ -253,3 +255,8 @@ def draw(
         seconds=ensemble.seconds * ensemble.threads,
         sha256=ensemble.sha256(),
     )
+
+
+def at_knots(law: Law) -> list[float]:
+    """Return the values of a bang-bang law at its knots, in order of time."""
+    return [float(law.value(fp, float(time))) for time in law.breakpoints()[::2]]

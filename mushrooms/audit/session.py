@@ -1,7 +1,7 @@
 """One audit: simulate what the claims need, examine each, keep what is finished.
 
-Every finding is saved in the results' folder; `resume` takes up those that the same sources made with the
-same settings. Whether particles are kept is up to the caller, by `simulate_run`.
+Every finding is saved in the results' folder; `resume` takes up those that the same sources made
+with the same settings. Whether particles are kept is up to the caller, by `simulate_run`.
 """
 
 import hashlib
@@ -30,8 +30,16 @@ from mushrooms.audit.runs import RUNS, Progress, Sample, Simulate, Simulation, S
 from scene.files.writer import sealed, unsealed, write_file
 from scene.refusal import check_seed
 
-# Modules of this folder that decide nothing: import-linter holds that none that decides imports them.
-SHOWING = ("command.py", "ensemble_command.py", "figures.py", "options.py", "page.py")
+# Modules of this folder that decide nothing: import-linter holds that none that decides imports
+# them.
+SHOWING = (
+    "command.py",
+    "ensemble_command.py",
+    "ensemble_table.py",
+    "figures.py",
+    "options.py",
+    "page.py",
+)
 
 
 class AuditSettings(NamedTuple):
@@ -97,8 +105,8 @@ def conduct(
         settings: size, seed, threads, folder.
         claims: to be checked, all by default.
         predict: theory, or a wrong one that must be found out.
-        simulate_run: what simulates the run of a name, with the signature of `steppers.simulate`, which
-            does so by default.
+        simulate_run: what simulates the run of a name, with the signature of `steppers.simulate`,
+            which does so by default.
         progress: told of each run's particles.
 
     Raises:
@@ -109,9 +117,14 @@ def conduct(
     begin = time.perf_counter()
     if settings.folder:
         settings.folder.mkdir(parents=True, exist_ok=True)
-        code()  # before anything is examined: an edit meanwhile is not what runs, and must not be told as it
+        # Before anything is examined: what is edited meanwhile does not run.
+        code()
     known = {claim.id: _kept(claim, settings) for claim in claims}
-    found = {name: from_data(data["finding"]) for name, data in known.items() if data.get("code") == code()}
+    found = {
+        name: from_data(data["finding"])
+        for name, data in known.items()
+        if data.get("code") == code()
+    }
     samples: dict[str, Sample] = {}
     for run in needed(claims, settings.size):
         samples[run.name] = draw(
@@ -145,7 +158,10 @@ def needed(claims: Sequence[Claim], size: Size) -> list[Simulation]:
 
 
 def kept(settings: AuditSettings) -> set[str]:
-    """Return the ids of the claims whose findings are there; what other sources found is found again."""
+    """Return the ids of the claims whose findings are there.
+
+    What other sources found is found again.
+    """
     return {claim.id for claim in all_claims() if _kept(claim, settings)}
 
 
@@ -154,15 +170,22 @@ def examine(claim: Claim, evidence: ClaimEvidence) -> Finding:
     begin = time.perf_counter()
     checks = list(claim.examine(evidence))
     verdict = verdict_of(claim, checks)
-    if verdict != "refuted" and not all(sample.is_whole for sample in evidence.samples(*claim.runs)):
+    if verdict != "refuted" and not all(
+        sample.is_whole for sample in evidence.samples(*claim.runs)
+    ):
         verdict = "indeterminate"
     return Finding(claim.id, verdict, checks, time.perf_counter() - begin)
 
 
 def _kept(claim: Claim, settings: AuditSettings) -> dict[str, Any]:
-    """Return the stored finding of a claim for these settings, from any earlier audit; empty without one."""
+    """Return the stored finding of a claim for these settings, from any earlier audit.
+
+    Empty without one.
+    """
     content = (
-        unsealed(settings.folder / f"{claim.id}.finding") if settings.folder and settings.resume else None
+        unsealed(settings.folder / f"{claim.id}.finding")
+        if settings.folder and settings.resume
+        else None
     )
     data: dict[str, Any] = json.loads(content) if content else {}
     return data if data.get("settings") == [settings.size, settings.seed] else {}
@@ -170,10 +193,10 @@ def _kept(claim: Claim, settings: AuditSettings) -> dict[str, Any]:
 
 @cache
 def code() -> str:
-    """Return the SHA-256 of the sources that findings owe their numbers to, measured rates among them.
+    """Return the SHA-256 of the sources, measured rates among them, that make the findings.
 
-    How findings are shown, and how a caller keeps particles, is no part of it: what is kept is looked at when
-    it is taken up.
+    How findings are shown, and how a caller keeps particles, is no part of it: what is kept is
+    looked at when it is taken up.
     """
     digest = hashlib.sha256()
     here = Path(__file__).parent
@@ -183,12 +206,18 @@ def code() -> str:
             is_file = path.is_file()  # an editor's dangling link is none
             if is_file and path.suffix in (".py", ".toml", ".json") and path not in shown:
                 content = path.read_bytes()
-                digest.update(f"{place.name}/{path.relative_to(place).as_posix()} {len(content)}\n".encode())
+                digest.update(
+                    f"{place.name}/{path.relative_to(place).as_posix()} {len(content)}\n".encode()
+                )
                 digest.update(content)
     return digest.hexdigest()
 
 
 def _save(claim: Claim, finding: Finding, settings: AuditSettings) -> None:
     if settings.folder:
-        data = {"settings": [settings.size, settings.seed], "code": code(), "finding": to_data(finding)}
+        data = {
+            "settings": [settings.size, settings.seed],
+            "code": code(),
+            "finding": to_data(finding),
+        }
         write_file(settings.folder / f"{claim.id}.finding", sealed(json.dumps(data).encode()))

@@ -24,7 +24,6 @@ from mushrooms.figures import style as plots, table as tables
 from mushrooms.orbits import BoolArray, FollowedOrbit, boundary, boundary_map, span_of_nu
 from scene import Mushroom, Scene, Stem
 from scene.geometry import table_at
-from scene.laws import is_constant
 from scene.mouth import start_time
 from scene.pieces import FloatArray
 from scene.refusal import BadInput, shown
@@ -202,7 +201,7 @@ def _draw_stem(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None) 
     if phase is not None:
         axes.set(xlabel="y [length]", ylabel="vy [length/time]")
         return
-    has_floor = isinstance(found[0].scene, Stem) and not is_constant(found[0].scene.h)
+    has_floor = isinstance(found[0].scene, Stem) and not found[0].scene.laws["h"].is_constant
     wall, name = ("floor", "vy") if has_floor else ("side", "|vx|")
     axes.set(
         xlim=(0, 1),

@@ -208,7 +208,8 @@ def with_minus_zeros(line: bytes) -> bytes:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of one line of protocol 1, published as docs/protocol.schema.json."""
-    requests, outcomes = get_args(Command), get_args(Answered)
+    requests = get_args(Command)
+    outcomes = get_args(Answered)
     answers = (Introduction, Echoed, Steps, Flown, Timed, Failed)
     _, definitions = msgspec.json.schema_components(
         [*requests, *outcomes, *answers, Scene], ref_template="#/$defs/{name}"

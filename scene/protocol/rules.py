@@ -24,9 +24,9 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from scene.laws import MAX_HARMONICS, MAX_KNOTS, BangBang, Fourier
+from scene.laws import MAX_HARMONICS, MAX_KNOTS, WRITTEN
 from scene.states import ON_WALL, State
-from scene.tables import HIDDEN, Cap, Mushroom, Scene, Stem, period
+from scene.tables import HIDDEN, Cap, Mushroom, Scene, Stem
 
 LATE = 2**30  # periods from time 0, or units of time if nothing moves
 LARGE = Fraction(10**100)
@@ -36,7 +36,7 @@ PI = Fraction(
 )
 
 TABLES: dict[str, type[msgspec.Struct]] = {"cap": Cap, "stem": Stem, "mushroom": Mushroom}
-KINDS: dict[str, type[msgspec.Struct]] = {"fourier": Fourier, "bang-bang": BangBang}
+KINDS: dict[str, type[msgspec.Struct]] = {str(kind.__struct_config__.tag): kind for kind in WRITTEN}
 OPTIONAL = {"slope", "w", "nu", "omega", "period", "cos", "sin"}  # null stands for an absent one, if ignored
 
 Part = Literal["scene", "law", "state", "request", "answer"]
@@ -282,7 +282,7 @@ def is_large(state: State) -> bool:
 
 def is_late(scene: Scene, t: float) -> bool:
     """Tell whether a time breaks the rule `early`, exactly."""
-    shared = period(scene)
+    shared = scene.cycle
     if shared is None:
         return abs(t) >= LATE
     if shared.length is not None:
@@ -310,7 +310,8 @@ def without_loose(data: Any) -> tuple[Any, bool]:
             del kept[name]
     is_loose = len(kept) < len(data)
     for name, law in kept.items():
-        if known := _fields_of(law, "kind", KINDS):
+        known = _fields_of(law, "kind", KINDS)
+        if known:
             kept[name] = {
                 field: part
                 for field, part in law.items()

@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 
 import msgspec
 
+from scene.laws import WRITTEN
 from scene.load import from_data
 from scene.protocol.messages import (
     MAX_SEQ,
@@ -85,8 +86,11 @@ class _Server:
         flow: Flowing | None,
         timer: Timer | None,
     ) -> None:
-        self.name, self.stepper, self.follower = name, stepper, follower
-        self.flow, self.timer = flow, timer
+        self.name = name
+        self.stepper = stepper
+        self.follower = follower
+        self.flow = flow
+        self.timer = timer
 
     def run(self, lines: BinaryIO, out: BinaryIO) -> None:
         for line in lines:
@@ -117,7 +121,7 @@ class _Server:
             "language": "Python",
             "profiles": [profile for profile, function in offered.items() if function is not None],
             "tables": ["cap", "stem", "mushroom"],
-            "laws": ["constant", "fourier", "bang-bang"],
+            "laws": ["constant", *(kind.__struct_config__.tag for kind in WRITTEN)],
         }
 
     def answer(self, command: StepRequest | TrajectoryRequest | FlowRequest | TimeRequest) -> dict[str, Any]:

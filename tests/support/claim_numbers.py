@@ -39,7 +39,8 @@ def mean(x: Any) -> Wanted:
 
 def share(x: Any) -> Wanted:
     """Return a share and its error, with two more of each kind."""
-    n, p = len(x) + 4, (np.sum(x) + 2) / (len(x) + 4)
+    n = len(x) + 4
+    p = (np.sum(x) + 2) / (len(x) + 4)
     return {"value": float(np.mean(x)), "error": float((p * (1 - p) / n) ** 0.5)}
 
 
@@ -81,7 +82,8 @@ class Numbers:
     """The comparisons by claim and words."""
 
     def __init__(self, sample: Callable[[str], Sample], predict: Callable[..., Any]) -> None:
-        self.sample, self._predict = sample, predict
+        self.sample = sample
+        self._predict = predict
 
     def limit(self, run: str) -> Any:
         """Return the theory of infinite energy."""
@@ -129,7 +131,8 @@ class Numbers:
 
     def width(self, run: str) -> Wanted:
         """The width of their peak."""
-        one, sigma = self.sample(run), self.at(run).peak[1] ** 0.5
+        one = self.sample(run)
+        sigma = self.at(run).peak[1] ** 0.5
         band = sigma * self.at(run).theory_error.variance / 2
         return {**spread(one.s[free(one), 0]), "expected": sigma, "band": band}
 
@@ -144,7 +147,8 @@ class Numbers:
         """M6: some sigma_N of the paper's number of particles."""
         n = 25_000 if run.startswith("moving") else 100_000
         s = self.sample(run).s[:, 0]
-        found, k = spread(s), int(count) / n**0.5
+        found = spread(s)
+        k = int(count) / n**0.5
         error = found["error"] * (1 + len(s) / n) ** 0.5
         return {"value": k * found["value"], "error": k * error, "band": 5e-5}
 
@@ -166,9 +170,11 @@ class Numbers:
 
     def of_M3(self, what: str) -> Wanted:
         """M3: E goes as a power of r in the cap."""
-        one, scene = self.sample("moving-cap@1e7"), load("moving-cap")
+        one = self.sample("moving-cap@1e7")
+        scene = load("moving-cap")
         first, last = (2 * math.pi * k / 16 for k in (7, 9))
-        begin, end = np.fmin.reduce(one.t_in[:, 0], axis=1), np.fmin.reduce(one.t_out[:, 0], axis=1)
+        begin = np.fmin.reduce(one.t_in[:, 0], axis=1)
+        end = np.fmin.reduce(one.t_out[:, 0], axis=1)
         inside = (begin < first) & (end > last)
         change = one.phase_s[inside, 0, 8] - one.phase_s[inside, 0, 6]
         rise = math.log(value(fp, scene.r, last) / value(fp, scene.r, first))
@@ -177,9 +183,11 @@ class Numbers:
 
     def extra_variance(self, run: str) -> Wanted:
         """M5: the variance beyond that of infinite energy."""
-        found, sharp = spread(self.sample(run).s[:, 0]), float(self.limit(run).sd)
+        found = spread(self.sample(run).s[:, 0])
+        sharp = float(self.limit(run).sd)
         error = found["error"] * (1 + self.sample(run).n / 100_000) ** 0.5
-        here, left = self.at(run), self.at(run).theory_error
+        here = self.at(run)
+        left = self.at(run).theory_error
         return {
             "value": found["value"] ** 2 - sharp**2,
             "error": 2 * found["value"] * error,
@@ -196,7 +204,8 @@ class Numbers:
             "fixed cap, anticlockwise": ["fixed-cap-anticlockwise@1e7", "fixed-cap-anticlockwise@1e9"],
             "fixed cap, clockwise": ["fixed-cap-clockwise@1e7", "fixed-cap-clockwise@1e9"],
         }[label]
-        energies, rows = [RUNS[run].energy for run in runs], []
+        energies = [RUNS[run].energy for run in runs]
+        rows = []
         for run in runs:
             s = self.sample(run).s[free(self.sample(run)), 0]
             rows.append(spread((2 * RUNS[run].energy) ** 0.5 * np.exp(s / 2) if "speeds" in what else s))
@@ -256,7 +265,8 @@ class Numbers:
 
     def of_X2(self, what: str) -> Wanted | None:
         """X2: the paper's share, and the narrower peak."""
-        low, high = self.sample("moving-cap@1e6"), self.sample("moving-cap@1e7")
+        low = self.sample("moving-cap@1e6")
+        high = self.sample("moving-cap@1e7")
         if "38.78" in what:
             found = share(free(high)[high.takes_part])
             return {**found, "error": math.hypot(found["error"], 0.00308), "expected": 0.3878, "band": 5e-5}
@@ -267,7 +277,8 @@ class Numbers:
 
     def of_X5(self, what: str) -> Wanted | None:
         """X5: c = 0."""
-        s, found = self.sample("ergodic@1e7").s[:, 0], self.at("ergodic@1e7")
+        s = self.sample("ergodic@1e7").s[:, 0]
+        found = self.at("ergodic@1e7")
         left = found.theory_error
         if what.startswith("mean of log"):
             return self.growth("ergodic@1e7", "0")
@@ -290,7 +301,8 @@ class Numbers:
 
     def twice(self, run: str) -> Wanted:
         """X7: the share captured in both windows."""
-        p_nc, here = float(self.limit(run).p_nc), self.at(run)
+        p_nc = float(self.limit(run).p_nc)
+        here = self.at(run)
         both = np.isfinite(self.sample(run).t_in[:, 0]).sum(axis=1) == 2
         band = here.theory_error.p_nc + abs(here.p_nc - p_nc)
         return {**share(both), "expected": (1 - p_nc**0.5) ** 2, "band": band}
@@ -320,7 +332,8 @@ class Numbers:
     def of_X4(self, what: str) -> Wanted | None:
         """X4: sums of n cycles."""
         run, n, figure = re.fullmatch(r"(\S+), n = (\d+): (.*)", what).groups()
-        k, sums = int(n), summed(run, int(n))
+        k = int(n)
+        sums = summed(run, int(n))
         total, m1, variance = (
             self.sample(run).s[:, k - 1],
             *map(float, theory.cumulants(load("moving-cap"), 3)[1:3]),
@@ -334,15 +347,18 @@ class Numbers:
                 "band": left.mean_s + N_SIGMA * sums.sd / N_DRAWN**0.5 / k,
             }  # fmt: skip
         if figure.startswith("standard"):
-            found, more = spread(total), abs(1 - k * variance / sums.sd**2) * left.variance / 2
+            found = spread(total)
+            more = abs(1 - k * variance / sums.sd**2) * left.variance / 2
             return {
                 "value": found["value"] / k, "error": found["error"] / k, "expected": sums.sd / k,
                 "band": (more + N_SIGMA / (2 * N_DRAWN) ** 0.5) * sums.sd / k,
             }  # fmt: skip
         if figure.startswith("share"):
-            mine, its = share(np.abs(z) < 1), share(np.abs(drawn) < 1)
+            mine = share(np.abs(z) < 1)
+            its = share(np.abs(drawn) < 1)
         elif figure.startswith("skewness"):
-            mine, its = mean(z**3), mean(drawn**3)
+            mine = mean(z**3)
+            its = mean(drawn**3)
         else:
             return None
         return {**mine, "expected": its["value"], "band": N_SIGMA * its["error"]}
@@ -367,7 +383,8 @@ class Numbers:
             return None
         one = self.sample(run)
         v = (2e4) ** 0.5 * np.exp(np.column_stack([np.zeros(one.n), one.s]) / 2)
-        half, whole = v[:, 60] - v[:, 0], v[:, 120] - v[:, 0]
+        half = v[:, 60] - v[:, 0]
+        whole = v[:, 120] - v[:, 0]
         if figure == "mean speed gained in a cycle":
             return mean(whole / 120)
         r = whole.mean() / half.mean()
@@ -376,7 +393,8 @@ class Numbers:
 
     def of_C9(self, what: str) -> Wanted:
         """C9: the share of the captured that gain."""
-        one, here = self.sample("moving-cap@1e7"), self.at("moving-cap@1e7")
+        one = self.sample("moving-cap@1e7")
+        here = self.at("moving-cap@1e7")
         gains = one.s[~free(one), 0]
         return {**share(gains > 0), "expected": 1 - float(here.captured_cdf(np.zeros(1))[0])}
 
@@ -393,7 +411,8 @@ class Numbers:
 
     def loss(self, run: str, n: str) -> Wanted:
         """D1: the share with less energy after n cycles."""
-        k, left = int(n), self.at(run).theory_error.mean_s
+        k = int(n)
+        left = self.at(run).theory_error.mean_s
         values = summed(run, k).values
         its = share(values < 0)
         near = np.mean(np.abs(values) < 0.05) / 0.1
@@ -402,9 +421,11 @@ class Numbers:
 
     def cap_change(self, run: str) -> Any:
         """Return the change of log(E V_cap) of the captured from phase 7/16 to 9/16."""
-        one, r = self.sample(run), load("moving-cap").r
+        one = self.sample(run)
+        r = load("moving-cap").r
         first, last = (2 * math.pi * k / 16 for k in (7, 9))
-        begin, end = np.fmin.reduce(one.t_in[:, 0], axis=1), np.fmin.reduce(one.t_out[:, 0], axis=1)
+        begin = np.fmin.reduce(one.t_in[:, 0], axis=1)
+        end = np.fmin.reduce(one.t_out[:, 0], axis=1)
         inside = (begin < first) & (end > last)
         cap = 2 * math.log(value(fp, r, last) / value(fp, r, first))
         return one.phase_s[inside, 0, 8] - one.phase_s[inside, 0, 6] + cap
@@ -445,7 +466,8 @@ class Numbers:
         """L4: nu at release less nu at capture."""
         if not what.startswith("nu("):
             return None
-        runs, rows = [f"moving-cap@1e{k}" for k in range(4, 9)], []
+        runs = [f"moving-cap@1e{k}" for k in range(4, 9)]
+        rows = []
         for run in runs:
             one = self.sample(run)
             t_in, t_out = (t[~free(one), 0, 0] for t in (one.t_in, one.t_out))
@@ -460,7 +482,8 @@ class Numbers:
 
     def zone_energy(self, run: str, phase: str) -> Wanted:
         """L5: mean log E of those not captured so far."""
-        one, t = self.sample(run), scene_of(RUNS[run]).period * float(phase)
+        one = self.sample(run)
+        t = scene_of(RUNS[run]).period * float(phase)
         k = RUNS[run].phases.index(float(phase))
         now, before = (float(self.at(run).zone([x])[0][0]) for x in (t, t - self.late(run)))
         band = self.at(run).theory_error.peak_mean + abs(now - before)
@@ -468,7 +491,8 @@ class Numbers:
 
     def zone_share(self, run: str, phase: str) -> Wanted:
         """L6: the share in the chaotic zone."""
-        one, t = self.sample(run), scene_of(RUNS[run]).period * float(phase)
+        one = self.sample(run)
+        t = scene_of(RUNS[run]).period * float(phase)
         inside = ((one.t_in[:, 0] <= t) & (t < one.t_out[:, 0])).any(axis=1)
         return {"value": float(1 - inside.mean())}
 

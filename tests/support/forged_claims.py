@@ -74,8 +74,10 @@ def coast(line: Line, t_end: float) -> Line:
 def move(exponent: int, random: Random, line: Line) -> Line | None:
     """Move one number by widths, times a power of ten: what is claimed is disjoint from the truth."""
     forged = plain(line)
-    step, name = random.choice(forged["expect"][0]["steps"]), random.choice(NUMBERS)
-    true, (low, high) = ends(step, name), map(Decimal, step[name])
+    step = random.choice(forged["expect"][0]["steps"])
+    name = random.choice(NUMBERS)
+    true = ends(step, name)
+    low, high = map(Decimal, step[name])
     width = max(DECIMAL.subtract(high, low), Decimal(1).scaleb(high.adjusted() - 23 if high else -30))
     shift = width * random.choice((-5, -3, -2, 2, 3, 5)) * 10**exponent
     step[name] = [str(DECIMAL.add(end, shift)) for end in (low, high)]
@@ -86,20 +88,23 @@ def rename_wall(random: Random, line: Line) -> Line | None:
     """Name another wall: where a hit is proved, no other wall is met."""
     forged = plain(line)
     step = random.choice(forged["expect"][0]["steps"])
-    true, step["wall"] = step.get("wall"), random.choice(verify.WALLS[line["scene"]["table"]])
+    true = step.get("wall")
+    step["wall"] = random.choice(verify.WALLS[line["scene"]["table"]])
     return forged if true not in (None, step["wall"]) else None
 
 
 def miss(random: Random, line: Line) -> Line | None:
     """Claim that nothing is met before a t_end that is after the proved hit."""
-    t, dt = line["state"]["t"], ends(line["expect"][0]["steps"][0], "dt")[1]
+    t = line["state"]["t"]
+    dt = ends(line["expect"][0]["steps"][0], "dt")[1]
     t_end = random.choice((line["t_end"], float(t + dt * (1 + Fraction(1, 2 ** random.randint(1, 40))))))
     return coast(line, t_end) if t_end > Fraction(t) + dt else None
 
 
 def meet_too_late(random: Random, line: Line) -> Line | None:
     """Move t_end before the proved hit, which is still claimed."""
-    t, dt = line["state"]["t"], ends(line["expect"][0]["steps"][0], "dt")[0]
+    t = line["state"]["t"]
+    dt = ends(line["expect"][0]["steps"][0], "dt")[0]
     t_end = float(t + dt * (1 - Fraction(1, 2 ** random.randint(1, 40))))
     return {**line, "t_end": t_end} if t <= t_end < Fraction(t) + dt else None
 
@@ -118,7 +123,8 @@ def answer_all_the_same(_: Random, line: Line) -> Line:
 def reorder(how: str, random: Random, line: Line) -> Line | None:
     """Exchange two steps that contradict each other, leave the first of them out, or end the path there."""
     forged = plain(line)
-    steps, answer = forged["expect"][0]["steps"], forged["expect"][0]
+    steps = forged["expect"][0]["steps"]
+    answer = forged["expect"][0]
     place = random.randrange(len(steps) - 1)
     is_false = contradicts(*steps[place : place + 2])
     if how == "exchange":
@@ -199,7 +205,8 @@ def scale_speed(random: Random, line: Line) -> Line | None:
     """Multiply vx and vy by one factor."""
     forged = plain(line)
     step = random.choice(forged["expect"][0]["steps"])
-    true, factor = plain(step), 1 + Decimal(random.choice((-3, 1, 2))).scaleb(-random.randint(1, 15))
+    true = plain(step)
+    factor = 1 + Decimal(random.choice((-3, 1, 2))).scaleb(-random.randint(1, 15))
     for name in ("vx", "vy"):
         step[name] = sorted((str(DECIMAL.multiply(Decimal(end), factor)) for end in step[name]), key=Decimal)
     return forged if contradicts(step, true) else None
@@ -224,7 +231,8 @@ def start_elsewhere(random: Random, line: Line) -> Line | None:
 
 def resize(random: Random, line: Line) -> Line | None:
     """Change the radius of a cap at rest: the place of a hit of its arc does not lie on the new arc."""
-    scene, wall = line["scene"], line["expect"][0]["steps"][0].get("wall")
+    scene = line["scene"]
+    wall = line["expect"][0]["steps"][0].get("wall")
     is_left = line["state"].get("wall") == "arc"  # its residual would move with the radius
     if not isinstance(scene.get("r"), float) or wall != "arc" or is_left:
         return None

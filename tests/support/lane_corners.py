@@ -28,7 +28,8 @@ def at_the_end_of_a_resting_arc(n: int, random: np.random.Generator) -> tuple[Sc
 
 
 def _from_resting_arc(at: float, random: np.random.Generator) -> Start:
-    angle, pace = random.uniform(0.1, 3.0), random.uniform(0.5, 2.0)
+    angle = random.uniform(0.1, 3.0)
+    pace = random.uniform(0.5, 2.0)
     x, y = np.cos(angle), np.sin(angle)
     goal = random.choice([-1.0, 1.0]) * at
     if abs(goal - x) < 0.3:
@@ -65,7 +66,8 @@ def _along_the_arc(r: GivenLaw, n: int, random: np.random.Generator, farthest: f
     starts = []
     for t, s in _times(n, random):
         angle = min(10.0 ** random.uniform(-2.5, 0.4), 2.9)
-        here, there = _at(r, t), _at(r, t + s)
+        here = _at(r, t)
+        there = _at(r, t + s)
         x, y = here * np.cos(angle), here * np.sin(angle)
         starts.append((_state(t, s, x, y, there, _offset(random, farthest)), int(records.ARC)))
     return starts
@@ -73,14 +75,19 @@ def _along_the_arc(r: GivenLaw, n: int, random: np.random.Generator, farthest: f
 
 def at_the_edge_of_the_mouth(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
     """Fly from the left side or the floor to the upper end of the right side."""
-    w, lean = _moving(0.5, random), float(random.choice([0.0, random.uniform(-0.3, 0.3)]))
+    w = _moving(0.5, random)
+    lean = float(random.choice([0.0, random.uniform(-0.3, 0.3)]))
     starts = []
     for t, s in _times(n, random):
-        here, there, off = _at(w, t), _at(w, t + s), _offset(random)
-        y, wall = -float(random.uniform(0.01, 0.95)), records.LEFT
+        here = _at(w, t)
+        there = _at(w, t + s)
+        off = _offset(random)
+        y = -float(random.uniform(0.01, 0.95))
+        wall = records.LEFT
         x = -(here + lean * y)
         if random.random() < 0.4:
-            y, wall = -1.0, records.FLOOR
+            y = -1.0
+            wall = records.FLOOR
             x = random.uniform(-0.9, 0.9) * (here - lean)
         starts.append((_state(t, s, x, y, there + lean * off, off), int(wall)))
     return Mushroom(r=1.0, w=w, h=1.0, slope=lean), starts

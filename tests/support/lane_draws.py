@@ -20,7 +20,8 @@ from scene.laws import is_constant, values
 from scene.tables import laws
 from support.lane_anywhere import Start
 
-N_CROWD, N_INSTANTS = 1500, 96
+N_CROWD = 1500
+N_INSTANTS = 96
 LOOK_AHEAD = 0.25  # phase
 MET: tuple[Wall, ...] = ("arc", "right", "left", "floor")
 
@@ -56,7 +57,8 @@ def draw_scene(aim: Aim, random: np.random.Generator) -> Mushroom:
     swing = float(random.choice(swings))
     moving = _moving(swing, random)
     share = 1.0 - 10.0 ** random.uniform(-7, -0.3) if aim.is_mouth_wide else 10.0 ** random.uniform(-4, -1)
-    share, depth = float(share), float(10.0 ** random.uniform(-1.5, 0.5))
+    share = float(share)
+    depth = float(10.0 ** random.uniform(-1.5, 0.5))
     if aim.moving == "h":
         return Mushroom(r=2.0, w=float(random.uniform(0.3, 1.9)), h=moving)
     if aim.moving == "w":
@@ -86,7 +88,8 @@ def draw_crowd(scene: Mushroom, aim: Aim, random: np.random.Generator) -> FloatA
     s = ahead * 10.0 ** random.uniform(-2, 0, n)
     if aim.is_captured and is_smooth:
         t = np.where(random.random(n) < 0.5, t, 2.0 * np.pi - 0.5 * s)  # about the greatest of cos t
-    now, then = table_at(fp, scene, t), table_at(fp, scene, t + s)
+    now = table_at(fp, scene, t)
+    then = table_at(fp, scene, t + s)
     pace = 1.0 / period
     small = 10.0 ** random.uniform(-6, 0, n) * pace
     sign = random.choice([-1.0, 1.0], n)
@@ -99,31 +102,36 @@ def draw_crowd(scene: Mushroom, aim: Aim, random: np.random.Generator) -> FloatA
             edge = now.w if random.random() < 0.5 else then.w
             x = edge + (widest - edge) * random.random(n)
             y = np.sqrt(np.maximum((now.r - x) * (now.r + x), 0.0))
-            vx, vy = np.zeros(n), -2.0 * y / s
+            vx = np.zeros(n)
+            vy = -2.0 * y / s
     elif aim.wall == records.ARC:
         angle = np.where(
             random.random(n) < 0.5, random.uniform(0, np.pi, n), 10.0 ** random.uniform(-3, 0.4, n)
         )
         x, y = now.r * np.cos(angle), now.r * np.sin(angle)
         edge = np.where(random.random(n) < 0.5, then.r, then.w)
-        x_s, y_s = sign * edge * inward, np.zeros(n)
+        x_s = sign * edge * inward
+        y_s = np.zeros(n)
         vx, vy = (x_s - x) / s, (y_s - y) / s
         if aim.moving == "r" and random.random() < 0.7:
             widest = then.w if aim.is_mouth_wide else then.r
             x, y, vx, vy = slipping(scene.r, t, s, widest, sign, random)
     elif aim.wall == records.BASE:
-        x, y = sign * (now.w + (now.r - now.w) * inward), np.zeros(n)
+        x = sign * (now.w + (now.r - now.w) * inward)
+        y = np.zeros(n)
         # About as fast as the arc, whose function is then hardly concave, or not.
         speed = pace_of_arc(scene, t) * 10.0 ** random.uniform(-1.5, 1.5, n)
         turn = np.pi * random.random(n)
         vx, vy = speed * np.cos(turn), speed * np.sin(turn)
     elif aim.wall == records.FLOOR:
-        x, y = sign * now.w * inward, -now.h
+        x = sign * now.w * inward
+        y = -now.h
         vx = sign * (now.w_rate + small * random.choice([-1.0, 1.0], n))
         vy = np.where(random.random(n) < 0.7, -y / s, small - now.h_rate)
     else:
         side = 1.0 if aim.wall == records.RIGHT else -1.0
-        x, y = side * now.w, -now.h * np.where(random.random(n) < 0.5, random.random(n), inward)
+        x = side * now.w
+        y = -now.h * np.where(random.random(n) < 0.5, random.random(n), inward)
         vx = side * (now.w_rate - small)
         vy = np.where(random.random(n) < 0.7, -y / s, pace * random.normal(size=n))
     return np.column_stack([t, x, y, vx, vy, np.full(n, ahead)])
@@ -133,7 +141,8 @@ def chords(
     now: TableAt, then: TableAt, t: FloatArray, s: FloatArray, random: np.random.Generator
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return starts on the arc whose chords, about s long, pass the mouth's edge closely."""
-    n, r = len(s), now.r
+    n = len(s)
+    r = now.r
     edge = np.where(random.random(n) < 0.5, np.maximum(now.w, then.w), now.w)
     spread = random.choice([-1.0, 1.0], n) * 10.0 ** random.uniform(-5, -0.5, n)
     sine = np.minimum(edge * (1.0 + spread) / r, 1.0 - 10.0 ** random.uniform(-6, -1, n))
@@ -143,8 +152,10 @@ def chords(
         2.0 * r * cosine / s,
         pace_of_arc(now.scene, t) * 10.0 ** random.uniform(-1, 1, n) + 1e-6,
     )
-    turn, way = np.pi * random.random(n), random.choice([-1.0, 1.0], n)
-    out, along = now.r_rate * (random.random(n) < 0.5) - speed * cosine, way * speed * sine
+    turn = np.pi * random.random(n)
+    way = random.choice([-1.0, 1.0], n)
+    out = now.r_rate * (random.random(n) < 0.5) - speed * cosine
+    along = way * speed * sine
     e_x, e_y = np.cos(turn), np.sin(turn)
     return r * e_x, r * e_y, out * e_x - along * e_y, out * e_y + along * e_x
 
@@ -170,7 +181,8 @@ def slipping(
     that it dips before or after; then 2 q such that f begins and ends above zero, and so does the parabola
     from which lanes guess the hit. At the end the particle may be no further out than `widest`.
     """
-    n, part = len(t), np.arange(1, 49) / 48.0
+    n = len(t)
+    part = np.arange(1, 49) / 48.0
     r, rate, bend = (values(law, t, order) for order in range(3))
     u = s[:, None] * part
     slope = (values(law, t[:, None] + u) ** 2 - r[:, None] ** 2) / u - 2.0 * (r * rate)[:, None]
@@ -200,7 +212,8 @@ def comes_and_goes(scene: Mushroom, crowd: FloatArray) -> npt.NDArray[np.bool_]:
     open_way = np.cumsum(crosses, axis=1) == 0
     found = np.zeros(len(crowd), dtype=bool)
     for wall in MET:
-        f, is_there = now.gap(wall, x_s, y_s), ~below if wall == "arc" else below
+        f = now.gap(wall, x_s, y_s)
+        is_there = ~below if wall == "arc" else below
         is_seen = is_there & open_way
         met = np.maximum.accumulate(is_seen & (f < 0.0), axis=1)
         found |= (met & is_seen & (f > 0.0)).any(axis=1)

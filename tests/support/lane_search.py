@@ -69,7 +69,8 @@ class Round(LaneRound):
 
     def call_loop(self, a: list[float], count: int) -> None:
         """Call the loop of the kernels that `follow.advance` calls."""
-        of, k = self.in_lanes, self.kernels
+        of = self.in_lanes
+        k = self.kernels
         waves = of.waves if of.form in (k.ONE_WAVE, k.TWO_WAVES) else None
         step = k.chord if self.is_disk else k.fly
         slope = None if of.is_slope_moving else of.slope
@@ -94,7 +95,9 @@ class Round(LaneRound):
 
     def careful(self, p: FloatArray, wall: int) -> tuple[int, FloatArray]:
         """Return the careful step's wall and dt, x, y, vx, vy; unfolded, those of the next hit of the arc."""
-        q, total, is_folded = p.copy(), 0.0, False
+        q = p.copy()
+        total = 0.0
+        is_folded = False
         if self.is_disk and q[3] < 0.0:
             q[3], q[5], is_folded = -q[3], -q[5], True
         code = records.NO_WALL
@@ -103,7 +106,8 @@ class Round(LaneRound):
             total += dt
             if not self.is_disk or code != records.BASE:
                 break
-            wall, is_folded = int(code), not is_folded
+            wall = int(code)
+            is_folded = not is_folded
         if is_folded:
             q[3], q[5] = -q[3], -q[5]
         return int(code), np.array([total, *q[2:]])
@@ -130,10 +134,12 @@ class Round(LaneRound):
     def fine(self, p: FloatArray, wall: int) -> FloatArray:
         """Return dt, x, y, vx, vy of a step that meets no base first, from pairs of floats, rounded once."""
         is_folded = bool(self.is_disk and p[3] < 0.0)
-        steps, met = np.zeros((1, 6, 2)), np.zeros(1, dtype=np.int64)
+        steps = np.zeros((1, 6, 2))
+        met = np.zeros(1, dtype=np.int64)
         t, t_low, x, y, vx, vy = p.tolist()
         if is_folded:
-            y, vy = -y, -vy
+            y = -y
+            vy = -vy
         start = FineState((t, t_low), (x, 0.0), (y, 0.0), (vx, 0.0), (vy, 0.0))
         called_off = np.zeros(1, np.int64)
         fine_path(self.compiled, self.anchors, start, wall, steps, met, called_off)
@@ -144,7 +150,8 @@ class Round(LaneRound):
 
     def moved(self, p: FloatArray, wall: int, nudge: float) -> FloatArray | None:
         """Return the sum over the start's numbers of |d step / d number| |number|, by differences."""
-        total, code = np.zeros(5), None
+        total = np.zeros(5)
+        code = None
         for k in (0, 2, 3, 4, 5):
             ends = []
             for sign in (-1.0, 1.0):
@@ -165,7 +172,8 @@ def search(seed: int, n: int, tally: Counter[str], name: str, kernels: ModuleTyp
     The search of faulty kernels ends with the first draw in which they are found out. Starts that are solved
     for are mostly left to the careful step: no more than n // ANSWERS_OF_A_DRAW draws are tried.
     """
-    random, group = np.random.default_rng(seed), GROUPS[name]
+    random = np.random.default_rng(seed)
+    group = GROUPS[name]
     found: list[Wrong] = []
     most = tally["lane answers"] + n
     for _ in range(n // ANSWERS_OF_A_DRAW):

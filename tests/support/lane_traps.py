@@ -40,7 +40,8 @@ def zero_between(off: Callable[[FloatArray], FloatArray], low: FloatArray, high:
         middle = 0.5 * (low + high)
         at = off(middle)
         is_left = below * at <= 0.0
-        low, high = np.where(is_left, low, middle), np.where(is_left, middle, high)
+        low = np.where(is_left, low, middle)
+        high = np.where(is_left, middle, high)
         below = np.where(is_left, below, at)
     middle = 0.5 * (low + high)
     return np.where(ok & (np.abs(off(middle)) < 1e-7), middle, np.nan)
@@ -55,8 +56,11 @@ def misled_chord(n: int, random: np.random.Generator) -> tuple[Scene, list[Start
     """
     mean = 4.0 + float(10.0 ** random.uniform(-3, 0))
     t = -random.uniform(0.02, 0.09, N_CROWD)
-    u_1, n_steps = REACH * random.uniform(0.3, 0.8, N_CROWD), int(random.integers(1, 3))
-    r, rate, bend = mean - np.cos(t), np.sin(t), np.cos(t)
+    u_1 = REACH * random.uniform(0.3, 0.8, N_CROWD)
+    n_steps = int(random.integers(1, 3))
+    r = mean - np.cos(t)
+    rate = np.sin(t)
+    bend = np.cos(t)
 
     def grown(u: FloatArray) -> FloatArray:  # (r(t + u)^2 - r(t)^2) / u
         d = np.cos(t) - np.cos(t + u)
@@ -84,7 +88,9 @@ def misled_chord(n: int, random: np.random.Generator) -> tuple[Scene, list[Start
     scene = Mushroom(r=Fourier(mean, 1.0, (-1.0,)), w=0.01, h=1.0)
     starts = []
     for i, turn in zip(chosen, random.uniform(0.3, 2.0, len(chosen)), strict=True):
-        e_x, e_y, along = np.cos(turn), np.sin(turn), np.sqrt(v2[i] - out[i] ** 2)
+        e_x = np.cos(turn)
+        e_y = np.sin(turn)
+        along = np.sqrt(v2[i] - out[i] ** 2)
         place = (r[i] * e_x, r[i] * e_y, out[i] * e_x - along * e_y, out[i] * e_y + along * e_x)
         starts.append((np.array([t[i], 0.0, *place]), int(records.ARC)))
     return scene, starts
@@ -101,13 +107,15 @@ def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]
     phi = 2.0 * np.arccos(swing)
     r = Fourier(1.0, 1.0, (swing,))
     nu = Fourier(0.5, 1.0, (float(0.5 * other * np.cos(phi)),), (float(-0.5 * other * np.sin(phi)),))
-    t, n_steps = np.pi - 0.5 * phi + random.uniform(-0.2, 0.1, N_CROWD), int(random.integers(1, 4))
+    t = np.pi - 0.5 * phi + random.uniform(-0.2, 0.1, N_CROWD)
+    n_steps = int(random.integers(1, 4))
 
     def w(u: FloatArray | float) -> FloatArray:
         return np.asarray(0.5 * (1.0 + swing * np.cos(t + u)) * (1.0 + other * np.cos(t + u + phi)))
 
     def rate(u: FloatArray | float) -> FloatArray:
-        one, two = t + u, t + u + phi
+        one = t + u
+        two = t + u + phi
         return np.asarray(
             -0.5 * swing * np.sin(one) * (1.0 + other * np.cos(two))
             - 0.5 * other * np.sin(two) * (1.0 + swing * np.cos(one))
@@ -159,23 +167,27 @@ def _radius(random: np.random.Generator) -> GivenLaw:
 
 def _start(r: GivenLaw, random: np.random.Generator) -> Start:
     t = 0.0 if random.random() < 0.3 else float(10.0 ** random.uniform(-12, 0))
-    now, rate = float(value(fp, r, t)), float(value(fp, r, t, 1))
+    now = float(value(fp, r, t))
+    rate = float(value(fp, r, t, 1))
     off = 0.0 if random.random() < 0.3 else float(10.0 ** random.uniform(-12, 0))
     angle = 0.5 * np.pi - off if random.random() < 0.8 else off + 1e-3
     along = float(random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-1, 3))
     out = rate - abs(along) * 10.0 ** random.uniform(-9, -0.3)
-    e_x, e_y = float(np.cos(angle)) if off else 0.0, float(np.sin(angle))
+    e_x = float(np.cos(angle)) if off else 0.0
+    e_y = float(np.sin(angle))
     place = (now * e_x, now * e_y, out * e_x - along * e_y, out * e_y + along * e_x)
     return np.array([t, 0.0, *place]), int(records.ARC)
 
 
 def up_a_deep_stem(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
     """Draw starts on the floor of a deep stem, through the mouth to the arc."""
-    depth, swing = float(10.0 ** random.uniform(2, 6)), float(random.choice([0.0, 0.3]))
+    depth = float(10.0 ** random.uniform(2, 6))
+    swing = float(random.choice([0.0, 0.3]))
     scene = Mushroom(r=Fourier(1.0, 1.0, (swing,)), nu=0.95, h=depth)
     starts = []
     for _ in range(n):
-        t, speed = float(random.uniform(0, 9)), float(depth * 10.0 ** random.uniform(1, 4))
+        t = float(random.uniform(0, 9))
+        speed = float(depth * 10.0 ** random.uniform(1, 4))
         width = 0.95 * (1.0 - swing)
         x, at_mouth = random.uniform(-width, width, 2)
         state = np.array([t, 0.0, x, -depth, speed * (at_mouth - x) / depth, speed])
@@ -185,18 +197,24 @@ def up_a_deep_stem(n: int, random: np.random.Generator) -> tuple[Scene, list[Sta
 
 def slow_beside_a_plateau(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
     """Draw short flights, slow towards a wall that stands nearly still, and is quick at other times."""
-    law, is_floor, starts = _plateau(int(random.integers(2, 9))), random.random() < 0.5, []
+    law = _plateau(int(random.integers(2, 9)))
+    is_floor = random.random() < 0.5
+    starts = []
     scene = Mushroom(r=3.0, w=1.0, h=law) if is_floor else Mushroom(r=3.0, w=law, h=1.0)
     for _ in range(n):
         t = float(2.0 * np.pi * random.integers(0, 5) + random.uniform(-0.4, 0.2))
-        speed, is_quick = 10.0 ** random.uniform(-4, -1.5), random.random() < 0.5
+        speed = 10.0 ** random.uniform(-4, -1.5)
+        is_quick = random.random() < 0.5
         along = 10.0 ** random.uniform(-0.5, 0.7) if is_quick else speed * random.random()
         s = min(speed, 0.5 / along) * 10.0 ** random.uniform(-3, -1)
-        there, rate = float(value(fp, law, t + s)), float(value(fp, law, t + s, 1))
+        there = float(value(fp, law, t + s))
+        rate = float(value(fp, law, t + s, 1))
         if is_floor:
-            place, wall = (1.0, (speed + rate) * s - there, -along, -speed - rate), records.RIGHT
+            place = (1.0, (speed + rate) * s - there, -along, -speed - rate)
+            wall = records.RIGHT
         else:
-            place, wall = (there - (speed + rate) * s, -1.0, speed + rate, along), records.FLOOR
+            place = (there - (speed + rate) * s, -1.0, speed + rate, along)
+            wall = records.FLOOR
         starts.append((np.array([t, 0.0, *place]), int(wall)))
     return scene, starts
 
@@ -210,17 +228,18 @@ def _plateau(n: int) -> Fourier:
 
 def across_a_slope_near_zero(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
     """Draw nearly level flights from the left side to the right, whose slope is only briefly small."""
-    swing, phase = 1.3, float(random.uniform(0.0, 6.0))
+    swing = 1.3
+    phase = float(random.uniform(0.0, 6.0))
     waves = (swing * np.cos(phase),), (swing * np.sin(phase),)
     slope = Fourier(-swing - 1e-9, 1.0, *(tuple(map(float, wave)) for wave in waves))
-    scene, starts = Mushroom(r=1.0, w=0.5, h=0.02, slope=slope), []
+    scene = Mushroom(r=1.0, w=0.5, h=0.02, slope=slope)
+    starts = []
     for _ in range(n):
         t = phase + float(2.0 * np.pi * random.integers(0, 2) + random.uniform(-0.06, -0.01))
-        y, m = -float(random.uniform(0.002, 0.018)), float(value(fp, slope, t))
-        vx, vy = (
-            float(random.uniform(10.0, 40.0)),
-            float(random.choice([-1, 1]) * 10.0 ** random.uniform(-4, -1)),
-        )
+        y = -float(random.uniform(0.002, 0.018))
+        m = float(value(fp, slope, t))
+        vx = float(random.uniform(10.0, 40.0))
+        vy = float(random.choice([-1, 1]) * 10.0 ** random.uniform(-4, -1))
         starts.append((np.array([t, 0.0, -(0.5 + m * y), y, vx, vy]), int(records.LEFT)))
     return scene, starts
 

@@ -21,8 +21,10 @@ N_WRONG_SIGN = 30.0  # of a wall's speed: hits that are slower keep the right si
 def laws(t, misprinted):
     """Return r, w, h and their rates: nu = 1 - .8 sin^2(t/2), or as printed with sin^2 t."""
     k = 2.0 if misprinted else 1.0
-    r, r1 = 1 + 0.5 * np.sin(t), 0.5 * np.cos(t)
-    nu, nu1 = 0.6 + 0.4 * np.cos(k * t), -0.4 * k * np.sin(k * t)
+    r = 1 + 0.5 * np.sin(t)
+    r1 = 0.5 * np.cos(t)
+    nu = 0.6 + 0.4 * np.cos(k * t)
+    nu1 = -0.4 * k * np.sin(k * t)
     return r, nu * r, 1 - 0.5 * np.sin(t), r1, nu1 * r + nu * r1, -r1
 
 
@@ -30,12 +32,16 @@ def laws(t, misprinted):
 def flight(p, t, wall, slope, misprinted):
     """Return time and wall (0 arc, 1 mouth or base, 2 right, 3 left, 4 floor) that is met next."""
     x, y, vx, vy = p
-    best, which = np.inf, -1
+    best = np.inf
+    which = -1
     if wall != 1 and y * vy < 0:
-        best, which = -y / vy, 1
+        best = -y / vy
+        which = 1
     if y > 0 or (y == 0 and vy > 0):
         r = laws(t, misprinted)[0]
-        b, c, v2 = x * vx + y * vy, x * x + y * y - r * r, vx * vx + vy * vy
+        b = x * vx + y * vy
+        c = x * x + y * y - r * r
+        v2 = vx * vx + vy * vy
         s = (-b + np.sqrt(max(b * b - v2 * min(c, 0.0), 0.0))) / v2
         for _ in range(8):
             r, _, _, r1, _, _ = laws(t + s, misprinted)
@@ -45,11 +51,13 @@ def flight(p, t, wall, slope, misprinted):
     for k in (2, 3, 4):
         if k == wall:
             continue
-        sign, s = (1.0 if k == 2 else -1.0), 0.0
+        sign = 1.0 if k == 2 else -1.0
+        s = 0.0
         for _ in range(8):
             _, w, h, _, w1, h1 = laws(t + s, misprinted)
             if k == 4:
-                f, f1 = y + vy * s + h, vy + h1
+                f = y + vy * s + h
+                f1 = vy + h1
             else:
                 f = w + slope * (y + vy * s) - sign * (x + vx * s)
                 f1 = w1 + slope * vy - sign * vx
@@ -57,7 +65,8 @@ def flight(p, t, wall, slope, misprinted):
             if not s < best:
                 break
         if 0 < s < best:
-            best, which = s, k
+            best = s
+            which = k
     return best, which
 
 
@@ -66,12 +75,18 @@ def bounced(p, t, wall, slope, misprinted, has_wrong_sign):
     """Return the velocity after a wall: v - 2 (v.n - u) n with n outward."""
     x, y, vx, vy = p
     r, _, _, r1, w1, h1 = laws(t, misprinted)
-    nx, ny, u = x / r, y / r, r1
+    nx = x / r
+    ny = y / r
+    u = r1
     if wall == 4:
-        nx, ny, u = 0.0, -1.0, h1
+        nx = 0.0
+        ny = -1.0
+        u = h1
     elif wall >= 2:
         size = np.sqrt(1 + slope * slope)
-        nx, ny, u = (1.0 if wall == 2 else -1.0) / size, -slope / size, w1 / size
+        nx = (1.0 if wall == 2 else -1.0) / size
+        ny = -slope / size
+        u = w1 / size
     vn = vx * nx + vy * ny
     u = -u if has_wrong_sign and abs(vn) > N_WRONG_SIGN * abs(u) else u
     return vx - 2 * (vn - u) * nx, vy - 2 * (vn - u) * ny
@@ -80,33 +95,46 @@ def bounced(p, t, wall, slope, misprinted, has_wrong_sign):
 @njit(cache=True)
 def cycle(p, t_end, slope, misprinted, has_wrong_sign, leak):
     """Follow a particle through a cycle; return its energy, and t_in and t_out of the stay at t = pi."""
-    t, wall, begin, end, t_in, t_out = 0.0, -1, np.inf, np.inf, np.nan, np.nan
+    t = 0.0
+    wall = -1
+    begin = np.inf
+    end = np.inf
+    t_in = np.nan
+    t_out = np.nan
     while True:
         s, wall = flight(p, t, wall, slope, misprinted)
         if not t + s < t_end:
             break
         t += s
-        x, y, vx, vy = p[0] + p[2] * s, p[1] + p[3] * s, p[2], p[3]
+        x = p[0] + p[2] * s
+        y = p[1] + p[3] * s
+        vx = p[2]
+        vy = p[3]
         w = laws(t, misprinted)[1]
         if wall == 0:
             if abs(x * vy - y * vx) > w * np.hypot(vx, vy):
-                begin, end = min(begin, t), np.inf
+                begin = min(begin, t)
+                end = np.inf
             elif begin < np.inf:
                 end = min(end, t)
         elif wall >= 2 and begin < np.inf:
             if begin <= pi <= min(end, t):
-                t_in, t_out = begin, min(end, t)
+                t_in = begin
+                t_out = min(end, t)
             begin = end = np.inf
         if wall == 1:
             if abs(x) < w * (1 + leak) or vy > 0:
-                x, y = max(min(x, w * (1 - 1e-9)), -w * (1 - 1e-9)), 0.0
+                x = max(min(x, w * (1 - 1e-9)), -w * (1 - 1e-9))
+                y = 0.0
             else:
-                y, vy = 0.0, -vy
+                y = 0.0
+                vy = -vy
         else:
             vx, vy = bounced((x, y, vx, vy), t, wall, slope, misprinted, has_wrong_sign)
         p = (x, y, vx, vy)
     if begin <= pi <= min(end, t_end):
-        t_in, t_out = begin, min(end, t_end)
+        t_in = begin
+        t_out = min(end, t_end)
     return (p[2] ** 2 + p[3] ** 2) / 2, t_in, t_out
 
 
@@ -115,7 +143,9 @@ def starts(n: int, seed: int, *, on_the_wall: bool = False) -> Any:
     random = np.random.default_rng(seed)
     x, y = random.uniform(-1, 1, 8 * n), random.uniform(-1, 1, 8 * n)
     inside = np.where(y > 0, np.hypot(x, y) < 1, np.abs(x) < 1 + 0.1111 * y)
-    x, y, angle = x[inside][:n], y[inside][:n], random.uniform(0, 2 * pi, n)
+    x = x[inside][:n]
+    y = y[inside][:n]
+    angle = random.uniform(0, 2 * pi, n)
     if on_the_wall:
         turn = random.uniform(0, pi, n)
         x, y = (1 - 1e-9) * np.cos(turn), (1 - 1e-9) * np.sin(turn)

@@ -23,7 +23,15 @@ from conformance import plain, profiles, properties
 from conformance.cases.draw import Draw
 from conformance.profiles import Statistic
 from conformance.suite.checks.bad_input import INSIDE, RESTING, move_inwards
-from conformance.suite.checks.form import FOREVER, Implementation, Question, SuiteCheck, octaves
+from conformance.suite.checks.form import (
+    FOREVER,
+    PROMPT,
+    Implementation,
+    Question,
+    SuiteCheck,
+    octaves,
+    rising,
+)
 from conformance.suite.checks.path_judge import CARRIED, answered_distance, crossing, distance
 from conformance.suite.checks.paths import MAX_HITS, draw_start, nearly_captured
 from conformance.suite.process import CheckFailure
@@ -96,7 +104,7 @@ ALONE = 2.0**-34  # of sizes: what a few bounces make of the rounding of a state
 
 def returning(draw: Draw, profile: str) -> Iterator[Question]:
     """Fly head on between two walls at rest, as many hits as are drawn."""
-    for n in octaves(draw, 1, MAX_HITS):
+    for n in rising(draw, 1, MAX_HITS):
         scene = draw.pick(RESTING)
         yield scene, draw.part(), math.floor(n) + draw.between(0.1, 0.9)
 
@@ -118,7 +126,10 @@ def arrive(side: Implementation, scene: Scene, begin: float, end: float) -> bool
         start, due = State(0.0, at, -0.5, length, 0.0), Horizon(t_end, to, -0.5, end_speed, 0.0)
     else:
         start, due = State(0.0, 0.0, at, 0.0, length), Horizon(t_end, 0.0, to, 0.0, end_speed)
+    n_hits = math.floor(end)
+    side.require_time("hits of a flow", n_hits)
     (found,) = side.flown(scene, [start], t_end)
+    side.keep_pace("hits of a flow", n_hits)
     arrival = read_outcome(found)
     if isinstance(arrival, Undecided):
         return False
@@ -128,7 +139,7 @@ def arrive(side: Implementation, scene: Scene, begin: float, end: float) -> bool
 
 def crowds(draw: Draw, profile: str) -> Iterator[Question]:
     """Ask flows of many states in any order: twins that differ in one field alone, bad ones, late ones."""
-    for n in octaves(draw, 1, MAX_STATES):
+    for n in rising(draw, 1, MAX_STATES):
         scene, state = draw.pick((draw_start(draw), *[nearly_captured(draw, draw.between(0.1, 0.3))[:2]] * 2))
         size, span = float(table_at(fp, scene, state.t).size), crossing(scene, state)
         pool = [
@@ -154,7 +165,9 @@ def together(
 ) -> bool:
     """Hold each state of a flow to be answered as alone, in its place, whatever the others are."""
     alone = {i: side.flown(scene, [pool[i]], t_end)[0] for i in sorted(set(order))}
+    side.require_time("states of a flow", len(order))
     found = side.flown(scene, [pool[i] for i in order], t_end)
+    side.keep_pace("states of a flow", len(order))
     n_compared = 0
     for place, (i, part) in enumerate(zip(order, found, strict=True)):
         own, t, where = alone[i], pool[i].t, f"states[{place}] of {len(order)}, {pool[i]}"
@@ -169,7 +182,7 @@ def together(
     return bool(n_compared)
 
 
-BATCH = 100  # particles per flow request: a slow implementation stays within its time limit
+BATCH = 100  # particles per flow request, at most
 KT = 1.0  # energy; that of the walls' own speed is up to 0.1
 TIMES = (0.25, 0.5)  # all walls of SHRINKING move inward until half of the period
 SCENE = "moving-cap"
@@ -278,12 +291,22 @@ def _predicted() -> theory.Prediction:
     return theory.predict(load(SCENE), 10)
 
 
+def batch_size(seconds: float, timeout: float) -> int:
+    """Return how many particles a flow request has, by the seconds that each took in the last one."""
+    return max(1, min(BATCH, int(PROMPT * timeout / max(seconds, 1e-9))))
+
+
 def _flow(
     side: Implementation, scene: Scene, states: Sequence[State], t_end: float
 ) -> list[tuple[Outcome, Captured]]:
+    """Carry an ensemble, first a particle alone: that tells how many are answered in time together."""
     found: list[tuple[Outcome, Captured]] = []
-    for start in range(0, len(states), BATCH):
-        for part in side.flown(scene, states[start : start + BATCH], t_end):
+    n_together = 1
+    while len(found) < len(states):
+        asked = states[len(found) : len(found) + n_together]
+        parts = side.flown(scene, asked, t_end)
+        n_together = batch_size(side.session.seconds / len(asked), side.session.limits.timeout)
+        for part in parts:
             outcome = read_outcome(part)
             if isinstance(outcome, Horizon) and not math.isclose(outcome.t, t_end, rel_tol=properties.BOUND):
                 raise CheckFailure("fail", f"a flow to t_end = {t_end!r} is answered at t = {outcome.t!r}")

@@ -26,6 +26,10 @@ from scene.protocol.messages import Introduction
 QUESTIONS = ("step", "trajectory", "flow")  # the profiles that answer by outcomes
 FOREVER = sys.float_info.max  # t_end of a question that only collisions end
 MAX_DRAWN = 6  # times that questions are drawn for an implementation of a part of the tables or laws
+# An answer of many hits is asked for if it is expected within this part of the time limit, by the pace of the
+# answers before: a machine under load may be four times as slow. A short answer is always asked for.
+PROMPT, SHORT = 0.25, 2**8
+LEAST_TIMED = 2**6  # hits from which an answer tells the pace: start and compilation do not matter then
 SEQ = MAX_SEQ // 2  # of a line that is written by hand
 Question = tuple[Any, ...]  # a scene that is asked about, or its data, and what else `judges` takes
 
@@ -109,13 +113,21 @@ class Implementation:
         session: with the implementation.
         profile: step, trajectory or flow (or time).
         answers: what it answered so far.
+        pace: seconds for a hit of a trajectory or a flow, or for a state of a flow, in the last long answer.
         errors: of its numbers so far, by what they are of (`checks.paths`).
     """
 
-    def __init__(self, session: Session, profile: str, answers: AnswerTally | None = None) -> None:
+    def __init__(
+        self,
+        session: Session,
+        profile: str,
+        answers: AnswerTally | None = None,
+        pace: dict[str, float] | None = None,
+    ) -> None:
         self.session, self.profile = session, profile
         self.errors: dict[str, list[float]] = {}
         self.answers = AnswerTally() if answers is None else answers
+        self.pace: dict[str, float] = {} if pace is None else pace
 
     def __call__(self, scene: Scene, state: State, t_end: float) -> Outcome:
         """Return one outcome: of a step, of a trajectory of one collision, or of a flow of one state."""
@@ -132,7 +144,7 @@ class Implementation:
         """
         for profile in profiles:
             if not missing(self.session.introduction, profile, to_data(scene)):
-                return Implementation(self.session, profile, self.answers)
+                return Implementation(self.session, profile, self.answers, self.pace)
         raise CheckFailure("unsupported", f"profile {' or '.join(profiles)}")
 
     def parts(self, request: Mapping[str, Any], n_due: int | None = None) -> list[dict[str, Any]]:
@@ -159,6 +171,27 @@ class Implementation:
             raise CheckFailure("wrong-format", f"{n_due} outcomes are due, answered are {found}"[:200])
         return found
 
+    def require_time(self, what: str, n: int) -> None:
+        """Leave out a question whose answer is not expected in time.
+
+        Args:
+            what: is counted, a name of `pace`.
+            n: how many of them the answer has.
+
+        Raises:
+            CheckFailure: declined.
+        """
+        expected = n * self.pace.get(what, 0.0)
+        limit = PROMPT * self.session.limits.timeout
+        if n > SHORT and expected > limit:
+            why = f"{n:,} {what} would take some {expected:.2g} s, more than {limit:g} s: not asked"
+            raise CheckFailure("declined", why)
+
+    def keep_pace(self, what: str, n: int) -> None:
+        """Note how long the last answer took for each of n."""
+        if n >= LEAST_TIMED:
+            self.pace[what] = self.session.seconds / n
+
     def said(self, line: str) -> dict[str, Any]:
         """Send a line as it is written, but for the seq in place of "SEQ", and return what it is answered."""
         return self.session.say(line.replace('"SEQ"', str(SEQ)).encode(), SEQ, self.profile)
@@ -167,7 +200,8 @@ class Implementation:
         """Follow up to n collisions, and what comes instead of a further one: at once, or step by step.
 
         Raises:
-            CheckFailure: fail for steps that are too many, too few, or go on after the end.
+            CheckFailure: fail for steps that are too many, too few, or go on after the end; declined for a
+                trajectory that would take too long.
         """
         found: list[Outcome] = []
         if self.profile == "step":
@@ -175,7 +209,10 @@ class Implementation:
                 found.append(self(scene, found[-1].state() if found else state, t_end))  # type: ignore[union-attr]
             return found
         t = state.t
-        for part in self.parts(question("trajectory", scene, state, t_end, n)):
+        self.require_time("hits of a trajectory", n)
+        parts = self.parts(question("trajectory", scene, state, t_end, n))
+        self.keep_pace("hits of a trajectory", len(parts))
+        for part in parts:
             found.append(read_outcome(part, t))
             t = getattr(found[-1], "t", t)
         hits = [isinstance(outcome, Collision) for outcome in found]
@@ -195,6 +232,11 @@ def octaves(draw: Draw, low: float, high: float) -> Iterator[float]:
     while high > low:
         yield high * 2.0 ** -(draw.part() * min(1.0, math.log2(high / low)))
         high /= 2
+
+
+def rising(draw: Draw, low: float, high: float) -> list[float]:
+    """Draw one number from each octave, the lowest first: each answer tells how long the next will take."""
+    return list(octaves(draw, low, high))[::-1]
 
 
 def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:

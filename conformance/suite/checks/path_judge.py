@@ -238,7 +238,9 @@ def _arrives(
         end = walker(scene, before, t_end)
     else:
         t_end, end = getattr(last, "t", state.t), last
+    side.require_time("hits of a flow", len(hits))
     (found,) = side.flown(scene, [state], t_end)
+    side.keep_pace("hits of a flow", len(hits))
     arrival = read_outcome(found)
     if isinstance(arrival, Undecided) or not isinstance(end, Horizon):
         return False

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from conformance import plain
 from conformance.cases import scenes
 from conformance.cases.draw import Draw, leaves, readable, wire_form
-from conformance.suite.checks.form import FOREVER, Question, octaves
+from conformance.suite.checks.form import FOREVER, Question, octaves, rising
 from scene import (
     BadInput,
     Cap,
@@ -221,8 +221,8 @@ def _replaced(data: Any, old: float, new: float) -> Any:
 
 def long(draw: Draw, profile: str) -> Iterator[Question]:
     """Follow paths of many hits, on orbits where rounding grows slowly."""
-    for i, n in enumerate(octaves(draw, 2, 16 if profile == "step" else MAX_HITS)):
-        scene, state = REGULAR[i % len(REGULAR)] if i else REGULAR[0]
+    for i, n in enumerate(rising(draw, 2, 16 if profile == "step" else MAX_HITS)):
+        scene, state = REGULAR[-1 - i % len(REGULAR)]  # the longest path is in a table that moves
         turned = replace(state, vx=state.vx * draw.between(0.9, 1.1), vy=state.vy * draw.between(0.9, 1.1))
         yield scene, turned, math.ceil(n)
 

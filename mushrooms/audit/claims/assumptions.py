@@ -19,7 +19,7 @@ import theory
 from mushrooms.audit.claim import DIGITS, Check, ClaimEvidence
 from mushrooms.audit.claims.experiments import one_cycle
 from mushrooms.audit.claims.finite_energy import ACW
-from mushrooms.audit.runs import RUNS, Sample, run_seed, scene_of
+from mushrooms.audit.runs import RUNS, Sample, at_knots, run_seed, scene_of
 from mushrooms.audit.tolerances import (
     Cdf,
     FloatArray,
@@ -33,8 +33,6 @@ from mushrooms.audit.tolerances import (
 )
 from scene import BangBang, Horizon, Mushroom, Scene, State, load
 from scene.geometry import table_at
-from scene.laws import bounds
-from scene.tables import laws, width_factors
 
 SCENES = ("moving-cap", "fixed-cap-clockwise")
 ENERGY = 1e7
@@ -199,9 +197,7 @@ def at_another_pace(legs: np.ndarray) -> Mushroom:
     assert isinstance(table, Mushroom)
     times = [0.0, *np.cumsum(legs)[:-1].tolist(), 1.0]
     h, w = (
-        BangBang(tuple((t, knot[1]) for t, knot in zip(times, law.knots, strict=True)))
-        for law in (table.h, table.w)
-        if isinstance(law, BangBang)
+        BangBang(tuple(zip(times, at_knots(table.laws[name]), strict=True))) for name in ("h", "w")
     )
     return Mushroom(r=table.r, h=h, w=w, slope=table.slope, name="another-pace")
 
@@ -285,9 +281,9 @@ def walls_speed(scene: Scene) -> float:
 
     The sides' is that at the mouth.
     """
-    speeds = [bounds(law).slope for name, law in laws(scene).items() if name in ("r", "h")]
+    speeds = [law.bounds().slope for name, law in scene.laws.items() if name in ("r", "h")]
     if isinstance(scene, Mushroom):
-        factors = [bounds(law) for law in width_factors(scene)]
+        factors = [law.bounds() for law in scene.width.factors]
         speeds.append(
             sum(f.slope * math.prod(g.highest for g in factors if g is not f) for f in factors)
         )

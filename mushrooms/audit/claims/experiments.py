@@ -39,9 +39,7 @@ from mushrooms.audit.tolerances import (
     spread,
     stated,
 )
-from scene.laws import bounds
 from scene.named import SCENES
-from scene.tables import laws
 
 MOVING = ("moving-cap@1e6", "moving-cap@1e7")
 MODE_BINS = np.linspace(-0.8, 1.1, 77)
@@ -53,7 +51,7 @@ def chord_time(sample: Sample) -> float:
 
     Capture and release are seen at arc hits.
     """
-    return 2 * float(bounds(laws(scene_of(sample.run))["r"]).highest) / sample.speed
+    return 2 * float(scene_of(sample.run).laws["r"].bounds().highest) / sample.speed
 
 
 def growth(evidence: ClaimEvidence, sample: Sample) -> Check:

@@ -42,8 +42,6 @@ from mushrooms.audit.tolerances import (
 )
 from scene import Scene, State, load
 from scene.geometry import area, table_at
-from scene.laws import bounds, values
-from scene.tables import laws
 
 if TYPE_CHECKING:
     from fast import Collisions
@@ -125,13 +123,13 @@ def _orbit(
     _, t, x_, y_, vx, vy = done.steps[at_arc].T
     momentum = np.abs(x_ * vy - y_ * vx)
     times = np.concatenate([t, (t[1:] + t[:-1]) / 2])
-    r, middle = np.split(values(scene.r, times), [len(t)])  # type: ignore[union-attr]
+    r, middle = np.split(scene.laws["r"].values(times), [len(t)])
     after = np.hypot(vx, vy)
     before = np.concatenate([[speed], after[:-1]])  # the base stands still
     phi = np.arcsin(momentum / (r * before))
     flown = np.arcsin(momentum[:-1] / (middle * after[:-1]))
     product = before * r
-    u_over_v = values(scene.r, t, 1) / before  # type: ignore[union-attr]
+    u_over_v = scene.laws["r"].values(t, 1) / before
     turned = np.arcsin(momentum / (r * after)) - phi - 2 * u_over_v * np.sin(phi)
     slowed = after / before - 1 + 2 * u_over_v * np.cos(phi)
     return {
@@ -172,7 +170,7 @@ def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
     high = captured[-2]
     # E is seen since the last hit, half a chord before on average, in which log V_cap changes by 2
     # u/v.
-    arc = bounds(laws(scene_of(high.run))["r"]).slope
+    arc = scene_of(high.run).laws["r"].bounds().slope
     yield close(
         f"{high.run.name}: its mean", mean(cap_change(high)), 0.0, band=2 * arc / high.speed
     )
@@ -298,8 +296,8 @@ def _largest_gap(sample: Sample) -> float:
     and sin(phi) = L/(v r) as much.
     """
     scene = scene_of(sample.run)
-    arc = bounds(laws(scene)["r"])
-    mouth = bounds(laws(scene)["nu"])
+    arc = scene.laws["r"].bounds()
+    mouth = scene.laws["nu"].bounds()
     return float(
         2 * 2 * arc.highest * mouth.slope
         + (2 * arc.slope + scene.period * arc.slope**2 / arc.lowest)

@@ -17,12 +17,11 @@ import scene as scenes
 import theory
 from mushrooms.audit.claim import DIGITS, Check, ClaimEvidence, Form
 from mushrooms.audit.claims.finite_energy import Figure, captured_change, less_bias
-from mushrooms.audit.runs import scene_of
+from mushrooms.audit.runs import at_knots, scene_of
 from mushrooms.audit.tolerances import close, exact, half_unit, mean, stated
 from scene import State
 from scene.geometry import table_at
-from scene.laws import bounds, value
-from scene.tables import Mushroom, laws
+from scene.tables import Mushroom
 
 FORMS: tuple[Form, Form] = ("printed", "corrected")
 ZERO = 1e-12  # float64 sums of a few hundred terms of order 10
@@ -144,11 +143,11 @@ def radius_squared(evidence: ClaimEvidence) -> Iterator[Check]:
     E V_cap is kept by the captured.
     """
     sample = evidence.sample("moving-cap@1e7")
-    r = laws(scene_of(sample.run))["r"]
-    first, last = (fp.log(value(fp, r, 2 * fp.pi * phase)) for phase in (7 / 16, 9 / 16))
+    r = scene_of(sample.run).laws["r"]
+    first, last = (fp.log(r.value(fp, 2 * fp.pi * phase)) for phase in (7 / 16, 9 / 16))
     gain = captured_change(sample, 6, 8)
     # E is seen since the last hit, half a chord before on average, in which log r changes by u/v.
-    band = 2 * float(bounds(r).slope) / sample.speed / abs(last - first)
+    band = 2 * float(r.bounds().slope) / sample.speed / abs(last - first)
     for power, form in zip((1, 2), FORMS, strict=True):
         bound = "r²" if power == 2 else "r"
         what = f"x² + y² <= {bound}: E goes as 1 / area of the cap, as r to the power"
@@ -194,17 +193,16 @@ def exponent_sign(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def fixed_cap(name: str) -> tuple[Any, Any, Any, Any, Any]:
     """Return w0, w1, h while the mouth closes and while it opens, and slope (sec. 4.1)."""
-    given = laws(scenes.load(name))
-    knots, depths = (given[law].knots for law in ("w", "h"))  # type: ignore[union-attr]
-    closing = next(i for i in range(len(knots) - 1) if knots[i + 1][1] < knots[i][1])
-    opening = next(i for i in range(len(knots) - 1) if knots[i + 1][1] > knots[i][1])
-    w1 = mpmath.mpf(knots[closing][1])
-    w0 = mpmath.mpf(knots[closing + 1][1])
-    return (
-        w0,
-        w1,
-        *(mpmath.mpf(x) for x in (depths[closing][1], depths[opening][1], given["slope"])),
-    )
+    laws = scenes.load(name).laws
+    widths = at_knots(laws["w"])
+    depths = at_knots(laws["h"])
+    closing = next(i for i in range(len(widths) - 1) if widths[i + 1] < widths[i])
+    opening = next(i for i in range(len(widths) - 1) if widths[i + 1] > widths[i])
+    w1 = mpmath.mpf(widths[closing])
+    w0 = mpmath.mpf(widths[closing + 1])
+    h_closing = mpmath.mpf(depths[closing])
+    h_opening = mpmath.mpf(depths[opening])
+    return w0, w1, h_closing, h_opening, mpmath.mpf(laws["slope"].level)
 
 
 # In the variable w, with r = 1 and h at rest, from the definitions of sec. 2. Theory integrates
@@ -472,11 +470,8 @@ def right_mode(_evidence: ClaimEvidence) -> list[Check]:
 def orientations(_evidence: ClaimEvidence) -> Iterator[Check]:
     """N6: the sense of sec. 4.1's loops in the plane (w, h), as eq. (cycle) and its reverse say."""
     for name, sign in (("fixed-cap-anticlockwise", 1), ("fixed-cap-clockwise", -1)):
-        moving = laws(scenes.load(name))
-        w, h = (
-            [v for _, v in moving[of].knots[:-1]]  # type: ignore[union-attr]
-            for of in ("w", "h")
-        )
+        moving = scenes.load(name).laws
+        w, h = (at_knots(moving[of])[:-1] for of in ("w", "h"))
         area = signed_area(w, h)
         yield stated(
             f"{name} in the plane (w, h)", area * sign > 0, f"area {area:+.3f}", f"sign {sign:+d}"

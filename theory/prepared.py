@@ -39,7 +39,7 @@ class Prepared:
         cycle: the period that all moving laws share; None for a static table.
         period: its length [time]; 0 for a static table.
         jointed: the moving laws that are not analytic at all times.
-        knots: the times in one period, law by law, at which laws are not analytic [time].
+        breakpoints: the times in one period, law by law, at which laws are not analytic [time].
         is_upright: whether the sides are vertical at all times.
     """
 
@@ -49,7 +49,7 @@ class Prepared:
     cycle: Period | None
     period: float
     jointed: tuple[Law, ...]
-    knots: tuple[float, ...]
+    breakpoints: tuple[float, ...]
     is_upright: bool
 
     @cached_property
@@ -103,6 +103,6 @@ def _prepared(scene: Mushroom) -> Prepared:
         cycle=scene.cycle,
         period=scene.period,
         jointed=tuple(law for law in laws.values() if law.breakpoints() and not law.is_constant),
-        knots=tuple(float(time) for law in laws.values() for time in law.breakpoints()),
+        breakpoints=tuple(float(time) for law in laws.values() for time in law.breakpoints()),
         is_upright=slope.is_constant and bool(slope.level == 0),
     )

@@ -210,7 +210,7 @@ def _is_one_cycle(measured: Prepared, sought: Prepared) -> bool:
     length = sought.period
     if length == 0 or not math.isclose(measured.period, length, rel_tol=SAME):
         return False  # of tables at rest no rates are kept
-    times = np.array([*(length * PHASES), *measured.knots, *sought.knots])
+    times = np.array([*(length * PHASES), *measured.breakpoints, *sought.breakpoints])
     mine = table_at(fp, measured.given, times)
     its = table_at(fp, sought.given, times)
     for name in ("r", "w", "h", "slope"):

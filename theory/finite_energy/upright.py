@@ -156,7 +156,7 @@ def _in_own_units(found: Floats, exponent: int) -> Floats:
 def _edges(mushroom: Prepared, start: float) -> Floats:
     """Return times from start to the cycle's end, rising, between which every law is one piece."""
     length = mushroom.period
-    inside = start + (np.array(mushroom.knots) - start) % length
+    inside = start + (np.array(mushroom.breakpoints) - start) % length
     even = start + length * np.arange(N_PANELS + 1) / N_PANELS
     return np.unique(np.concatenate([even, inside[inside < even[-1]]]))
 

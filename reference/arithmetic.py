@@ -141,7 +141,9 @@ class Arithmetic:
         if isinstance(value, Fraction):
             return self.number(value.numerator) / self.number(value.denominator)
         exactly = raw.from_int if isinstance(value, int) else raw.from_float
-        return self.context.make_mpf((exactly(value, self.prec, raw.DOWN), exactly(value, self.prec, raw.UP)))
+        return self.context.make_mpf(
+            (exactly(value, self.prec, raw.DOWN), exactly(value, self.prec, raw.UP))
+        )
 
     def dyadic(self, value: Fraction) -> Interval:
         """Return the thin interval at a rational whose denominator is a power of two, exactly."""

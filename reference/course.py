@@ -128,16 +128,22 @@ class Course:
         x = self.flight.x + self.flight.vx * crossing
         w = self.motion.width(crossing).f
         gaps: tuple[tuple[Wall, Interval], ...] = (("left", w + x), ("right", w - x))
-        signs = [sign(gap - self.leaving[side] if side in self.leaving else gap) for side, gap in gaps]
+        signs = [
+            sign(gap - self.leaving[side] if side in self.leaving else gap) for side, gap in gaps
+        ]
         if self.in_cap and -1 in signs:
             return self._base_hit(crossing)
         if signs != [1, 1]:
             return self._at_the_edge()
         if self.table.is_stem:
             return self._base_hit(crossing)
-        found = self._first_hit(SIDES if self.in_cap else ("arc",), self.arithmetic.lower(crossing), None)
+        found = self._first_hit(
+            SIDES if self.in_cap else ("arc",), self.arithmetic.lower(crossing), None
+        )
         if isinstance(found, Hit) and not is_below(crossing, found.time):
-            raise Undecidable("a wall is met at the height of the mouth, as far as this precision shows")
+            raise Undecidable(
+                "a wall is met at the height of the mouth, as far as this precision shows"
+            )
         return found
 
     def _at_the_edge(self) -> Undefined:
@@ -242,9 +248,13 @@ class Course:
         """List the flight times, before the horizon, at which straight walls that stand still are met."""
         times = [rational.crossing_time(state)]
         times += [rational.straight_time(self.table, state, wall) for wall in SIDES]
-        return [time for time in times if time is not None and (self.end is None or time < self.end)]
+        return [
+            time for time in times if time is not None and (self.end is None or time < self.end)
+        ]
 
-    def _met_at(self, instant: Fraction, hits: list[Hit], limit: Interval | None) -> tuple[Wall, ...]:
+    def _met_at(
+        self, instant: Fraction, hits: list[Hit], limit: Interval | None
+    ) -> tuple[Wall, ...]:
         """List the walls met exactly then, when all others are met later; else nothing."""
         assert self.exact is not None
         met: list[Wall] = []
@@ -255,7 +265,9 @@ class Course:
             met += ["base"] if crossing == instant else []
         for hit in hits:
             low, high = exact_ends(hit.time)
-            is_met = low <= instant <= high and rational.is_zero(self.table, self.exact, hit.wall, instant)
+            is_met = low <= instant <= high and rational.is_zero(
+                self.table, self.exact, hit.wall, instant
+            )
             if is_met:
                 met.append(hit.wall)
             elif low <= instant:
@@ -290,7 +302,10 @@ class Course:
 
         f must have a sign there, because a root may lie at that later end too.
         """
-        ends = [self.arithmetic.upper(stop + length * share) for share in (BEYOND, 2 * BEYOND, 3 * BEYOND)]
+        ends = [
+            self.arithmetic.upper(stop + length * share)
+            for share in (BEYOND, 2 * BEYOND, 3 * BEYOND)
+        ]
         return next((end for end in ends if sign(search.value(end)) != 0), ends[0])
 
     def _isolator(self, wall: Wall) -> Isolator:
@@ -316,7 +331,9 @@ class Course:
             start = self.arithmetic.zero
             jet = partial(motion.wall, wall)
             before = arithmetic.number(-1)
-            search = Isolator(arithmetic, jet, before, self.leaving.get(wall), timeline=self.motion.timeline)
+            search = Isolator(
+                arithmetic, jet, before, self.leaving.get(wall), timeline=self.motion.timeline
+            )
             try:
                 is_clear = sign(search.value(start)) > 0 and search.first_fall(start, turn) is None
             except Exhausted:

@@ -39,7 +39,9 @@ from reference.jets import Jet
 from reference.timeline import Timeline
 
 MAX_EXCLUDED = 4000  # sub-intervals of one wall on which f > 0 is proved
-MAX_PARTS = 2 * MAX_EXCLUDED  # sub-intervals that a search examines: halving needs so many for MAX_EXCLUDED
+MAX_PARTS = (
+    2 * MAX_EXCLUDED
+)  # sub-intervals that a search examines: halving needs so many for MAX_EXCLUDED
 MAX_NEWTON = 200
 
 
@@ -138,7 +140,9 @@ class Isolator:
             return jet
         first = self.jet(a).d1
         last = self.jet(b).d1
-        return jet._replace(d1=self.arithmetic.intersection(jet.d1, self.arithmetic.union([first, last])))
+        return jet._replace(
+            d1=self.arithmetic.intersection(jet.d1, self.arithmetic.union([first, last]))
+        )
 
     def _expanded(self, whole: Interval, jet: Jet) -> Jet:
         """Enclose f and f' again, by Taylor's theorem: f' is Lipschitz, also across knots.
@@ -175,7 +179,9 @@ class Isolator:
             return
         for point in (a, cut, latest if is_below(latest, b) else b):
             if self._may_begin(point) and sign(self.jet(point).d1) <= 0:
-                raise Undecidable("the flight begins along its wall, as far as this precision shows")
+                raise Undecidable(
+                    "the flight begins along its wall, as far as this precision shows"
+                )
 
     def _is_excluded(self, a: Interval, b: Interval, jet: Jet) -> bool:
         """Tell whether f and its derivatives prove f > 0 on (a, b]."""
@@ -185,9 +191,13 @@ class Isolator:
         if self._may_begin(a):
             if self.is_flat and sign(jet.d2) > 0:
                 return True
-            is_all_within = is_below(self.begin, b) and not is_below(self.arithmetic.lower(self.begin), a)
+            is_all_within = is_below(self.begin, b) and not is_below(
+                self.arithmetic.lower(self.begin), a
+            )
             return is_concave and is_all_within and sign(self.value(b)) > 0
-        return self._sign_of(jet.f) > 0 or ((sign(jet.d1) < 0 or is_concave) and sign(self.value(b)) > 0)
+        return self._sign_of(jet.f) > 0 or (
+            (sign(jet.d1) < 0 or is_concave) and sign(self.value(b)) > 0
+        )
 
     def _is_never_reached(self, a: Interval, b: Interval) -> bool:
         """Tell whether the wall never comes, over at least a period, to where the flight is at a nor at b."""
@@ -197,12 +207,18 @@ class Isolator:
             return False
         return ask(b) and ask(a)
 
-    def _parts(self, a: Interval, b: Interval, whole: Interval, jet: Jet) -> list[tuple[Interval, Interval]]:
+    def _parts(
+        self, a: Interval, b: Interval, whole: Interval, jet: Jet
+    ) -> list[tuple[Interval, Interval]]:
         """Cut an interval: around its least value where f is convex, at a knot, or half way."""
         if sign(jet.d2) > 0 and sign(jet.d1) == 0 and not self._may_begin(a):
             low, high = self._bottom(whole)
             if is_below(a, low) and is_below(high, b):
-                return [(a, low), (low, high), (high, b)] if is_below(low, high) else [(a, low), (low, b)]
+                return (
+                    [(a, low), (low, high), (high, b)]
+                    if is_below(low, high)
+                    else [(a, low), (low, b)]
+                )
         middle = self._split(a, b)
         return [(a, middle), (middle, b)]
 
@@ -227,7 +243,9 @@ class Isolator:
                 low = self.arithmetic.lower(narrower - margin)
                 high = self.arithmetic.upper(narrower + margin)
                 at_low = sign(self.value(low))
-                if at_low < 0 or (at_low > 0 and self._is_positive(self.arithmetic.hull(low, high))):
+                if at_low < 0 or (
+                    at_low > 0 and self._is_positive(self.arithmetic.hull(low, high))
+                ):
                     return low, high
             if is_last:
                 raise Undecidable("f and f' vanish together, as far as this precision shows")

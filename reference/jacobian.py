@@ -79,7 +79,10 @@ def _with_near_knot(course: Course, hit: Hit, moves: list[Interval]) -> Interval
     low, high = exact_ends(hit.time)
     begin = course.arithmetic.number(flight.instant)
     sizes = [begin + hit.time, begin]
-    sizes += [d * at for d, at in zip(moves, (begin, flight.x, flight.y, flight.vx, flight.vy), strict=True)]
+    sizes += [
+        d * at
+        for d, at in zip(moves, (begin, flight.x, flight.y, flight.vx, flight.vy), strict=True)
+    ]
     reach = NEAR * sum(max(map(abs, exact_ends(size))) for size in sizes)
     is_near = course.motion.timeline.knot_between(low - reach, high + reach) is not None
     return course.arithmetic.between(low - reach, high + reach) if is_near else hit.time
@@ -92,7 +95,10 @@ def chained(later: Matrix, earlier: Matrix) -> Matrix:
         later: Jacobian of the last step.
         earlier: d(t, x, y, vx, vy) at its start / d(initial state).
     """
-    rows = [[sum(a * b[j] for a, b in zip(row, earlier, strict=True)) for j in range(5)] for row in later]
+    rows = [
+        [sum(a * b[j] for a, b in zip(row, earlier, strict=True)) for j in range(5)]
+        for row in later
+    ]
     rows[0] = [a + b for a, b in zip(rows[0], earlier[0], strict=True)]
     return rows
 

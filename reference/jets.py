@@ -37,7 +37,9 @@ def multiply(p: Jet, q: Jet) -> Jet:
 
 def square(arithmetic: Arithmetic, p: Jet) -> Jet:
     """Return p^2, with f and d1^2 as true squares."""
-    return Jet(arithmetic.square(p.f), _twice(p.f * p.d1), _twice(arithmetic.square(p.d1) + p.f * p.d2))
+    return Jet(
+        arithmetic.square(p.f), _twice(p.f * p.d1), _twice(arithmetic.square(p.d1) + p.f * p.d2)
+    )
 
 
 def united(arithmetic: Arithmetic, jets: Sequence[Jet]) -> Jet:

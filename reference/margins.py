@@ -29,7 +29,9 @@ def measure(course: Course, hit: Hit) -> Margins:
     others = [wall for wall in neighbours(course, hit.wall) if wall != hit.wall]
     distances = [distance(course, hit, wall) for wall in others]
     gaps = [gap for gap in (_gap(course, hit, wall) for wall in others) if gap is not None]
-    return Margins(_least(arithmetic, gaps), _least(arithmetic, distances), arithmetic.enclosure(-hit.slope))
+    return Margins(
+        _least(arithmetic, gaps), _least(arithmetic, distances), arithmetic.enclosure(-hit.slope)
+    )
 
 
 def neighbours(course: Course, wall: Wall) -> tuple[Wall, ...]:
@@ -61,5 +63,9 @@ def _least(arithmetic: Arithmetic, numbers: list[Interval]) -> Enclosure | None:
     """Enclose the smallest of some enclosed numbers."""
     found: Enclosure | None = None
     for number in map(arithmetic.enclosure, numbers):
-        found = number if found is None else Enclosure(min(found.lo, number.lo), min(found.hi, number.hi))
+        found = (
+            number
+            if found is None
+            else Enclosure(min(found.lo, number.lo), min(found.hi, number.hi))
+        )
     return found

@@ -123,10 +123,14 @@ def trajectory(
     table = prepare(scene)
     if working is not None:
         working = check_count("working", working, 1, MAX_DIGITS)
-        return _follow(Arithmetic(working), table, state, t_end, n_collisions, None, is_differentiated)
+        return _follow(
+            Arithmetic(working), table, state, t_end, n_collisions, None, is_differentiated
+        )
 
     def follow(digits_now: int) -> Trajectory:
-        return _follow(Arithmetic(digits_now), table, state, t_end, n_collisions, digits, is_differentiated)
+        return _follow(
+            Arithmetic(digits_now), table, state, t_end, n_collisions, digits, is_differentiated
+        )
 
     most = 8 * (digits + GUARD_DIGITS + n_collisions)
     return _decided(follow, digits + GUARD_DIGITS + n_collisions // 4, most)
@@ -276,7 +280,9 @@ def fly_on(course: Course, hit: Hit, after: Bounce) -> Course:
     leaving = {hit.wall: course.leaving.get(hit.wall, arithmetic.zero)}
     in_cap = hit.wall == "arc" or (hit.wall == "base" and not table.is_stem)
     end = None if course.end is None else course.end + course.flight.instant - after.flight.instant
-    return Course(table, MovingWalls(arithmetic, table, after.flight), leaving, False, in_cap, end, None)
+    return Course(
+        table, MovingWalls(arithmetic, table, after.flight), leaving, False, in_cap, end, None
+    )
 
 
 def collision(course: Course, hit: Hit, after: Bounce) -> ProvedCollision:
@@ -297,7 +303,9 @@ def collision(course: Course, hit: Hit, after: Bounce) -> ProvedCollision:
 
 def arrived(arithmetic: Arithmetic, state: State) -> ProvedHorizon:
     """Return a state that is at the horizon."""
-    numbers = (arithmetic.number(value) for value in (state.t, state.x, state.y, state.vx, state.vy))
+    numbers = (
+        arithmetic.number(value) for value in (state.t, state.x, state.y, state.vx, state.vy)
+    )
     return ProvedHorizon(Moment(*map(arithmetic.enclosure, numbers)), arithmetic.digits)
 
 

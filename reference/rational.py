@@ -51,7 +51,12 @@ class ExactNumber:
         """Return the product, by cos a cos b = (cos(a + b) + cos(a - b)) / 2."""
         return _collected(
             (
-                Wave(p.power + q.power, p.x + k * q.x, p.quarters + k * q.quarters, p.is_part and q.is_part),
+                Wave(
+                    p.power + q.power,
+                    p.x + k * q.x,
+                    p.quarters + k * q.quarters,
+                    p.is_part and q.is_part,
+                ),
                 a * b / 2,
             )
             for p, a in self.terms.items()
@@ -138,7 +143,10 @@ def law_jet(law: Law, time: Fraction) -> Jet:
         factor = exact(1)
         for order in range(3):
             # A derivative turns each cosine by a quarter; sin x is cos(x - quarter).
-            waves = ((Wave(0, k * angle, order - turn, is_part), Fraction(c)) for turn, c in ((0, a), (1, b)))
+            waves = (
+                (Wave(0, k * angle, order - turn, is_part), Fraction(c))
+                for turn, c in ((0, a), (1, b))
+            )
             totals[order] += factor * _collected(waves)
             factor *= frequency * exact(k)
     return Jet(*totals)

@@ -88,7 +88,9 @@ def _check_part(table: PreparedTable, state: State) -> None:
     if state.wall == "arc" and state.y < 0:
         raise InvalidState(f"state.y = {state.y!r} on wall arc is beyond wall base, must be >= 0")
     if state.wall in SIDES and state.y > 0:
-        raise InvalidState(f"state.y = {state.y!r} on wall {state.wall} is above the stem, must be <= 0")
+        raise InvalidState(
+            f"state.y = {state.y!r} on wall {state.wall} is above the stem, must be <= 0"
+        )
 
 
 def _walls_near(table: PreparedTable, state: State) -> list[Wall]:
@@ -122,7 +124,9 @@ def _judge_on_base(table: PreparedTable, state: State, motion: MovingWalls) -> U
     if _is_on(table, state, "arc", motion):
         return Undefined("corner")
     if state.vy < 0:
-        raise InvalidState(f"state.vy = {state.vy!r}: the particle starts on wall base and moves into it")
+        raise InvalidState(
+            f"state.vy = {state.vy!r}: the particle starts on wall base and moves into it"
+        )
     return Undefined("sliding") if state.vy == 0 else None
 
 
@@ -133,14 +137,18 @@ def _is_beside_mouth(table: PreparedTable, state: State, motion: MovingWalls) ->
     return any(sign(motion.wall(wall, motion.arithmetic.zero).f) < 0 for wall in ("left", "right"))
 
 
-def _judge_rise(table: PreparedTable, state: State, wall: Wall, motion: MovingWalls) -> Undefined | bool:
+def _judge_rise(
+    table: PreparedTable, state: State, wall: Wall, motion: MovingWalls
+) -> Undefined | bool:
     """Judge f' at the start on a wall: True if f' = 0 and f'' > 0, False if f' > 0."""
     jet = motion.wall(wall, motion.arithmetic.zero)
     rise = sign(jet.d1)
     if rise > 0:
         return False
     if rise < 0:
-        raise InvalidState(f"state.wall = {wall!r}: the particle starts on this wall and moves into it")
+        raise InvalidState(
+            f"state.wall = {wall!r}: the particle starts on this wall and moves into it"
+        )
     exact = rational.wall_jet(table, state, wall, Fraction(0))
     if not exact.d1.is_zero():
         raise Undecidable("f' at the start has no sign")

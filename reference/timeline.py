@@ -46,7 +46,9 @@ class Timeline:
     """
 
     def __init__(self, arithmetic: Arithmetic, table: PreparedTable, instant: Fraction) -> None:
-        self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in table.laws.items()}
+        self.laws = {
+            name: law_in_time(arithmetic, law, instant) for name, law in table.laws.items()
+        }
         length = None if table.cycle is None else table.cycle.value(arithmetic.context)
         self.turn = None if length is None else arithmetic.upper(length)  # a period at least
         self._arithmetic = arithmetic
@@ -145,7 +147,9 @@ class Legs:
         speed = max(bend * length for bend, length in zip(bends, lengths, strict=True))
         bend = max(bends)
         both = arithmetic.context.mpf([-1, 1])
-        whole = arithmetic.union([arithmetic.number(leg.coefficients[0]) for leg in self.law.half_legs])
+        whole = arithmetic.union(
+            [arithmetic.number(leg.coefficients[0]) for leg in self.law.half_legs]
+        )
         return Jet(whole, arithmetic.number(speed) * both, arithmetic.number(bend) * both)
 
     def knots(self, low: Fraction, high: Fraction) -> list[Fraction]:
@@ -222,7 +226,9 @@ class Waves:
         powers = self._powers(s - middle)
 
         def series(order: int) -> Interval:
-            products = (d * power for d, power in zip(derivatives[order + 1 :], powers, strict=False))
+            products = (
+                d * power for d, power in zip(derivatives[order + 1 :], powers, strict=False)
+            )
             return sum(products, derivatives[order])
 
         return Jet(series(0), series(1), series(2))

@@ -70,7 +70,9 @@ def wall_function(
 class MovingWalls:
     """Evaluates the walls along a flight."""
 
-    def __init__(self, arithmetic: Arithmetic, table: PreparedTable, flight: EnclosedFlight) -> None:
+    def __init__(
+        self, arithmetic: Arithmetic, table: PreparedTable, flight: EnclosedFlight
+    ) -> None:
         self.arithmetic = arithmetic
         self.flight = flight
         self.table = table

@@ -8,7 +8,16 @@ from scene.laws import BangBang, Constant, Fourier, GivenLaw, Law
 from scene.load import catalogue, from_data, load, to_data
 from scene.notebook import of_scene
 from scene.refusal import BadInput, InvalidScene, check_count, check_number
-from scene.states import Collision, Horizon, InvalidState, Outcome, Rejected, State, Undecided, Undefined
+from scene.states import (
+    Collision,
+    Horizon,
+    InvalidState,
+    Outcome,
+    Rejected,
+    State,
+    Undecided,
+    Undefined,
+)
 from scene.tables import Cap, Mushroom, Scene, Stem, Wall, _Table, check_scene
 
 __all__ = [

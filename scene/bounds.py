@@ -38,14 +38,18 @@ def of_legs(knots: Sequence[tuple[float, float]]) -> Bounds:
 def of_waves(mean: float, harmonics: Harmonics, omega: float, rate: int) -> Bounds:
     """Bound a mean and one harmonic at least, whose frequency is omega 2^rate to a few roundings."""
     _, unit = math.frexp(max(max(abs(c), abs(s)) for _, c, s in harmonics))
-    terms = [(k * omega, math.hypot(math.ldexp(c, -unit), math.ldexp(s, -unit))) for k, c, s in harmonics]
+    terms = [
+        (k * omega, math.hypot(math.ldexp(c, -unit), math.ldexp(s, -unit))) for k, c, s in harmonics
+    ]
     swing = round_up(sum(size for _, size in terms), unit)
     slope = round_up(sum(size * f for f, size in terms), unit + rate)
     curvature = round_up(sum(size * f * f for f, size in terms), unit + 2 * rate)
     # The sum of two floats errs by half a unit of its last place, and not at all where it is subnormal.
     lowest = mean - swing
     highest = mean + swing
-    return Bounds(lowest - _slack(lowest, swing), highest + _slack(highest, swing), slope, curvature)
+    return Bounds(
+        lowest - _slack(lowest, swing), highest + _slack(highest, swing), slope, curvature
+    )
 
 
 def least_of_waves(mean: float, harmonics: Harmonics) -> float:
@@ -60,7 +64,9 @@ def least_of_waves(mean: float, harmonics: Harmonics) -> float:
     bend = sum(k * k * (abs(c) + abs(s)) for k, c, s in waves)
     for n in (2**8, 2**11, 2**14, 2**17):
         phases = np.arange(n) * (2.0 * np.pi / n)
-        least = float((1.0 + sum(c * np.cos(k * phases) + s * np.sin(k * phases) for k, c, s in waves)).min())
+        least = float(
+            (1.0 + sum(c * np.cos(k * phases) + s * np.sin(k * phases) for k, c, s in waves)).min()
+        )
         found = least - bend * (2.0 * np.pi / n) ** 2 / 8.0 - 2.0**-40 * size
         if found > 0.5 * least:
             return found * mean
@@ -74,7 +80,11 @@ def of_product(first: Bounds, second: Bounds) -> Bounds:
         first.lowest * second.lowest / grow,
         first.highest * second.highest * grow,
         (first.slope * second.highest + first.highest * second.slope) * grow,
-        (first.curvature * second.highest + 2 * first.slope * second.slope + first.highest * second.curvature)
+        (
+            first.curvature * second.highest
+            + 2 * first.slope * second.slope
+            + first.highest * second.curvature
+        )
         * grow,
     )
 

@@ -56,7 +56,8 @@ def half_angle(law: float | Law, order: int = 0) -> tuple[Polynomial, int]:
             cosine, sine = k * sine, -k * cosine
         # cos(k a) + i sin(k a) = (1 + i x)^(2 k) / (1 + x^2)^k with x = tan(a / 2).
         cos, sin = (
-            [Fraction(comb(2 * k, j) * unit[j % 4]) for j in range(2 * k + 1)] for unit in POWERS_OF_I
+            [Fraction(comb(2 * k, j) * unit[j % 4]) for j in range(2 * k + 1)]
+            for unit in POWERS_OF_I
         )
         wave = add(scale(cos, cosine), scale(sin, sine))
         total = add(total, multiply(wave, one_plus_square(n - k)))
@@ -77,7 +78,9 @@ def trimmed(p: Polynomial) -> Polynomial:
 def add(p: Polynomial, q: Polynomial) -> Polynomial:
     """Return p + q."""
     n = max(len(p), len(q))
-    return trimmed([(p[i] if i < len(p) else Fraction(0)) + (q[i] if i < len(q) else 0) for i in range(n)])
+    return trimmed(
+        [(p[i] if i < len(p) else Fraction(0)) + (q[i] if i < len(q) else 0) for i in range(n)]
+    )
 
 
 def multiply(p: Polynomial, q: Polynomial) -> Polynomial:
@@ -135,7 +138,9 @@ def divide(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
         quotient[shift] = factor
         for i, b in enumerate(divisor):
             rest[shift + i] -= factor * b
-    return _primitive(trimmed(list(map(Fraction, quotient)))), _primitive(trimmed(list(map(Fraction, rest))))
+    return _primitive(trimmed(list(map(Fraction, quotient)))), _primitive(
+        trimmed(list(map(Fraction, rest)))
+    )
 
 
 class Sturm:
@@ -151,7 +156,9 @@ class Sturm:
             chain.append(scale(divide(chain[-2], chain[-1])[1], Fraction(-1)))
         self.chain = [divide(part, chain[-2])[0] for part in chain[:-1]]
         self.root_free_of_squares = self.chain[0]
-        self._variations = cache(self._count_variations)  # intervals that are halved share their ends
+        self._variations = cache(
+            self._count_variations
+        )  # intervals that are halved share their ends
 
     def _count_variations(self, x: Fraction) -> int:
         signs = [v > 0 for v in (at(q, x) for q in self.chain) if v != 0]

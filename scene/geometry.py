@@ -165,7 +165,9 @@ class TableAt(NamedTuple):
         lines = []
         if not isinstance(self.scene, Stem):
             angles = [math.pi * k / n_arc for k in range(n_arc + 1)]
-            lines.append([(w, 0.0), *((r * math.cos(a), r * math.sin(a)) for a in angles), (-w, 0.0)])
+            lines.append(
+                [(w, 0.0), *((r * math.cos(a), r * math.sin(a)) for a in angles), (-w, 0.0)]
+            )
         if not isinstance(self.scene, Cap):
             lines.append([(-w, 0.0), (-foot, -h), (foot, -h), (w, 0.0)])
         if isinstance(self.scene, Stem):

@@ -279,7 +279,9 @@ class Fourier(
         cos, sin = (tuple(times_power(a, size) for a in given) for given in (self.cos, self.sin))
         omega = None if self.omega is None else times_power(self.omega, -time)
         period = None if self.period is None else times_power(self.period, time)
-        return Fourier(mean=times_power(self.mean, size), omega=omega, cos=cos, sin=sin, period=period)
+        return Fourier(
+            mean=times_power(self.mean, size), omega=omega, cos=cos, sin=sin, period=period
+        )
 
     def reversed(self) -> Fourier:
         """Return the law that runs backwards."""
@@ -297,9 +299,13 @@ class BangBang(Law, frozen=True, tag_field="kind", tag="bang-bang", forbid_unkno
         Raises:
             InvalidScene: naming the knot, the value and the bound.
         """
-        knots = check_list("bang-bang.knots", self.knots, "a list of pairs [time, value]", InvalidScene)
+        knots = check_list(
+            "bang-bang.knots", self.knots, "a list of pairs [time, value]", InvalidScene
+        )
         if not 2 <= len(knots) <= MAX_KNOTS:
-            raise InvalidScene(f"bang-bang.knots has {len(knots)} knots, must have 2 to {MAX_KNOTS}")
+            raise InvalidScene(
+                f"bang-bang.knots has {len(knots)} knots, must have 2 to {MAX_KNOTS}"
+            )
         force_setattr(self, "knots", tuple(checked_knot(i, knot) for i, knot in enumerate(knots)))
         check_legs(self.knots)
 
@@ -312,7 +318,9 @@ class BangBang(Law, frozen=True, tag_field="kind", tag="bang-bang", forbid_unkno
             stop, after = map(Fraction, next_knot)
             half_acceleration = 2 * (after - before) / (stop - start) ** 2
             zero = Fraction(0)
-            found.append(PolynomialPiece(start, (before, zero, half_acceleration), (start + stop) / 2))
+            found.append(
+                PolynomialPiece(start, (before, zero, half_acceleration), (start + stop) / 2)
+            )
             found.append(PolynomialPiece(stop, (after, zero, -half_acceleration), stop))
         return tuple(found)
 
@@ -390,7 +398,9 @@ class BangBang(Law, frozen=True, tag_field="kind", tag="bang-bang", forbid_unkno
 
     def scaled(self, size: int, time: int) -> BangBang:
         """Return the law with its values times 2^size and its times times 2^time."""
-        return BangBang(knots=tuple((times_power(t, time), times_power(v, size)) for t, v in self.knots))
+        return BangBang(
+            knots=tuple((times_power(t, time), times_power(v, size)) for t, v in self.knots)
+        )
 
     def reversed(self) -> BangBang:
         """Return the law that runs backwards."""
@@ -434,7 +444,8 @@ class Product(NamedTuple):
     def _combined(self, order: int, at: Any) -> Any:
         """Apply Leibniz's rule to the factors' derivatives, `at(law, order)`."""
         terms = [
-            math.comb(order, k) * at(self.first, order - k) * at(self.second, k) for k in range(order + 1)
+            math.comb(order, k) * at(self.first, order - k) * at(self.second, k)
+            for k in range(order + 1)
         ]
         return sum(terms[1:], terms[0])
 
@@ -481,8 +492,12 @@ def amplitudes(field: str, given: object) -> tuple[float, ...]:
     """
     numbers = check_list(field, given, "a list of numbers", InvalidScene)
     if len(numbers) > MAX_HARMONICS:
-        raise InvalidScene(f"{field} has {len(numbers)} harmonics, at most {MAX_HARMONICS} are allowed")
-    return tuple(check_number(f"{field}[{k}]", number, InvalidScene) for k, number in enumerate(numbers))
+        raise InvalidScene(
+            f"{field} has {len(numbers)} harmonics, at most {MAX_HARMONICS} are allowed"
+        )
+    return tuple(
+        check_number(f"{field}[{k}]", number, InvalidScene) for k, number in enumerate(numbers)
+    )
 
 
 def checked_knot(i: int, knot: object) -> tuple[float, float]:
@@ -518,7 +533,9 @@ def check_legs(knots: tuple[tuple[float, float], ...]) -> None:
         )
     span = end - start
     if not math.isfinite(span) or Fraction(span) != Fraction(end) - Fraction(start):
-        raise InvalidScene(f"bang-bang.knots span {start} to {end}: the period must be a binary64 number")
+        raise InvalidScene(
+            f"bang-bang.knots span {start} to {end}: the period must be a binary64 number"
+        )
 
 
 def _called(law: Law | Product, t: Any) -> Any:
@@ -541,11 +558,6 @@ def is_constant(law: float | Law) -> bool:
     return law_of(law).is_constant
 
 
-def period_of(law: float | Law) -> Period | None:
-    """Return the period of a law that moves; None when it never changes."""
-    return law_of(law).cycle
-
-
 def shared_period(laws: Iterable[float | Law]) -> Period | None:
     """Return the period of the first law that moves."""
     return shared_cycle(map(law_of, laws))
@@ -559,11 +571,6 @@ def piece_at(law: float | Law, time: Fraction) -> Piece:
 def breakpoints(law: float | Law) -> list[Fraction]:
     """Return the times in one period, ends included, at which the law is not analytic."""
     return law_of(law).breakpoints()
-
-
-def evaluate(ctx: Any, piece: Piece, t: Any, order: int = 0) -> Any:
-    """Evaluate a piece, or its first or second derivative."""
-    return piece.evaluate(ctx, t, order)
 
 
 def value(ctx: Any, law: float | Law, t: Any, order: int = 0) -> Any:

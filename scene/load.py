@@ -25,7 +25,9 @@ def catalogue() -> list[str]:
     """Return the names of the scenes that ship with the package, `moving-cap-as-printed` included."""
     folder = resources.files("scene") / "catalogue"
     return sorted(
-        entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
+        entry.name.removesuffix(".toml")
+        for entry in folder.iterdir()
+        if entry.name.endswith(".toml")
     )
 
 
@@ -61,7 +63,11 @@ def read_data(source: str | Path) -> Any:
         if path.is_fifo() or path.is_char_device():  # which may have no end, or never begin
             raise OSError(errno.EINVAL, "it is a pipe or a device, must be a file")
         text = path.read_text("utf-8-sig")  # without the mark that some editors put before it
-        return tomllib.loads(text) if path.suffix == ".toml" else json.loads(text, object_pairs_hook=_once)
+        return (
+            tomllib.loads(text)
+            if path.suffix == ".toml"
+            else json.loads(text, object_pairs_hook=_once)
+        )
     except OSError as error:
         raise InvalidScene(f"scene {name!r} cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
@@ -189,7 +195,9 @@ def limit_definitions(definitions: dict[str, Any]) -> None:
     mushroom = definitions["Mushroom"]
     for field in ("w", "nu"):
         forms = mushroom["properties"][field]["anyOf"]
-        mushroom["properties"][field] = {"anyOf": [form for form in forms if form != {"type": "null"}]}
+        mushroom["properties"][field] = {
+            "anyOf": [form for form in forms if form != {"type": "null"}]
+        }
     mushroom["oneOf"] = [{"required": ["w"]}, {"required": ["nu"]}]
     for table in ("Cap", "Stem", "Mushroom"):
         for field in ("name", "notes"):

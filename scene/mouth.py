@@ -88,7 +88,9 @@ def _motion(law: Law, start: float, span: float) -> Motion:
     highest = law.bounds().highest
 
     def motion(u: FloatArray) -> FloatArray:
-        return np.stack([law.values(start + span * u, order) / highest * span**order for order in range(3)])
+        return np.stack(
+            [law.values(start + span * u, order) / highest * span**order for order in range(3)]
+        )
 
     return motion
 
@@ -98,7 +100,9 @@ def _cuts(start: float, span: float, factors: tuple[Law, Law]) -> FloatArray:
     waves = [law.harmonics() for law in factors if law.harmonics()]
     parts = 2 * sum(harmonics[-1][0] for harmonics in waves)
     knots = [float(t - Fraction(start)) / span for law in factors for t in law.breakpoints()]
-    return np.unique(np.concatenate([np.linspace(0.0, 1.0, max(parts, 1) + 1), np.array(knots) % 1.0]))
+    return np.unique(
+        np.concatenate([np.linspace(0.0, 1.0, max(parts, 1) + 1), np.array(knots) % 1.0])
+    )
 
 
 def _slope(w: FloatArray, r: FloatArray) -> FloatArray:

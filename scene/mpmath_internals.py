@@ -34,7 +34,9 @@ is_less: Callable[[Raw, Raw], bool] = libmpf.mpf_lt
 is_greater: Callable[[Raw, Raw], bool] = libmpf.mpf_gt
 sign: Callable[[Raw], int] = libmpf.mpf_sign
 add: Callable[[Raw, Raw], Raw] = libmpf.mpf_add  # exactly
-subtract: Callable[[Raw, Raw, int, str], Raw] = libmpf.mpf_sub  # rounded to so many bits, in this direction
+subtract: Callable[[Raw, Raw, int, str], Raw] = (
+    libmpf.mpf_sub
+)  # rounded to so many bits, in this direction
 rounded: Callable[[Raw, int, str], Raw] = libmpf.mpf_pos
 shifted: Callable[[Raw, int], Raw] = libmpf.mpf_shift  # times a power of two
 pi: Callable[[int, str], Raw] = libelefun.mpf_pi

@@ -46,7 +46,9 @@ def _picture(scene: Scene, span: float) -> str:
     unit = 0.02 * max(right - left, top - bottom)
     lines = [
         f"<polyline fill='none' stroke='{shade}' stroke-width='2' "
-        "vector-effect='non-scaling-stroke' points='" + " ".join(f"{x:.6g},{-y:.6g}" for x, y in line) + "'/>"
+        "vector-effect='non-scaling-stroke' points='"
+        + " ".join(f"{x:.6g},{-y:.6g}" for x, y in line)
+        + "'/>"
         for outline, shade in zip(outlines, SHADES, strict=False)
         for line in outline
     ]

@@ -124,14 +124,19 @@ class PolynomialPiece(NamedTuple):
             found = [self._evaluate_exactly(each, order) for each in t.ravel().tolist()]
             return np.array(found).reshape(t.shape)
         about = self.polynomial(Fraction(t))
-        return exact(Arrays, perm(order, order) * about[order] if order < len(about) else Fraction(0))
+        return exact(
+            Arrays, perm(order, order) * about[order] if order < len(about) else Fraction(0)
+        )
 
     def polynomial(self, start: Fraction) -> list[Fraction]:
         """Return the coefficients in t - start; the last one is not 0."""
         away = start - self.origin
         n = len(self.coefficients)
         found = [
-            sum((comb(k, j) * self.coefficients[k] * away ** (k - j) for k in range(j, n)), Fraction(0))
+            sum(
+                (comb(k, j) * self.coefficients[k] * away ** (k - j) for k in range(j, n)),
+                Fraction(0),
+            )
             for j in range(n)
         ]
         while found and found[-1] == 0:

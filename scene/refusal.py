@@ -79,7 +79,9 @@ def check_number(field: str, value: object, refusal: type[BadInput] = BadInput) 
     return number
 
 
-def check_list(field: str, value: object, what: str, refusal: type[BadInput] = BadInput) -> Sequence[Any]:
+def check_list(
+    field: str, value: object, what: str, refusal: type[BadInput] = BadInput
+) -> Sequence[Any]:
     """Return a list, a tuple or the like, text excepted.
 
     Args:

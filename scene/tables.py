@@ -75,7 +75,9 @@ class _Table(
     def laws(self) -> Mapping[str, Law]:
         """Return the laws that the table gives, by the names of its parameters."""
         given = {name: getattr(self, name, None) for name in PARAMETERS}
-        return MappingProxyType({name: law_of(law) for name, law in given.items() if law is not None})
+        return MappingProxyType(
+            {name: law_of(law) for name, law in given.items() if law is not None}
+        )
 
     @cached_property
     def width(self) -> Law | Product:
@@ -157,7 +159,11 @@ def check_scene(scene: object) -> None:
     # A scene is proved valid when it is made; a subclass could omit the proof.
     if type(scene) in (Cap, Stem, Mushroom):
         return
-    hint = f"; a name or a file is loaded by scene.load({shown(scene)})" if isinstance(scene, str) else ""
+    hint = (
+        f"; a name or a file is loaded by scene.load({shown(scene)})"
+        if isinstance(scene, str)
+        else ""
+    )
     raise BadInput(f"scene = {shown(scene)}, must be a Cap, a Stem or a Mushroom{hint}")
 
 
@@ -184,7 +190,9 @@ def period(scene: Scene) -> Period | None:
 def _prove(table: type[_Table], given: tuple[GivenLaw | None, ...]) -> None:
     # Cached by value: -0.0 and 0.0 count as equal, and validity is a matter of real numbers. A refusal is
     # not kept, so its message shows the numbers at hand.
-    found = {name: law_of(law) for name, law in zip(PARAMETERS, given, strict=True) if law is not None}
+    found = {
+        name: law_of(law) for name, law in zip(PARAMETERS, given, strict=True) if law is not None
+    }
     if table is Mushroom and (("w" in found) == ("nu" in found)):
         raise InvalidScene("a mushroom needs exactly one of `w` and `nu`")
     prove(found, _conditions(found))
@@ -192,12 +200,16 @@ def _prove(table: type[_Table], given: tuple[GivenLaw | None, ...]) -> None:
 
 def _conditions(found: dict[str, Law]) -> list[Condition]:
     """List what must hold at all times for a table with these laws (sec. 2, here with a strict apex)."""
-    listed = [Condition(f"{name} > 0", ((1, (law,)),)) for name, law in found.items() if name != "slope"]
+    listed = [
+        Condition(f"{name} > 0", ((1, (law,)),)) for name, law in found.items() if name != "slope"
+    ]
     if "h" not in found:
         return listed
     width: tuple[Law, ...] = (found["nu"], found["r"]) if "nu" in found else (found["w"],)
     if "nu" in found:
-        listed.append(Condition("nu <= 1", ((1, (Constant(1.0),)), (-1, (found["nu"],))), is_strict=False))
+        listed.append(
+            Condition("nu <= 1", ((1, (Constant(1.0),)), (-1, (found["nu"],))), is_strict=False)
+        )
     elif "r" in found:
         listed.append(Condition("w <= r", ((1, (found["r"],)), (-1, width)), is_strict=False))
     return [*listed, Condition("w > h slope", ((1, width), (-1, (found["h"], found["slope"]))))]

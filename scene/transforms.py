@@ -39,7 +39,9 @@ def scaled_state(state: State, length: int, time: int) -> State:
 
 def scaled(scene: Table, length: int, time: int) -> Table:
     """Return the scene with lengths times 2^length and times times 2^time; `nu` and `slope` do not change."""
-    return _with_laws(scene, lambda name, law: law.scaled(0 if name in ("nu", "slope") else length, time))
+    return _with_laws(
+        scene, lambda name, law: law.scaled(0 if name in ("nu", "slope") else length, time)
+    )
 
 
 def scaled_law(law: float | Law, size: int, time: int) -> Any:
@@ -63,7 +65,8 @@ def frozen(scene: Table, t: float) -> Table:
 def idle(scene: Table) -> Table:
     """Return a static scene with every number written as a Fourier law of amplitude zero."""
     return _with_laws(
-        scene, lambda _, law: Fourier(mean=float(law.value(fp, 0.0)), omega=1.0, cos=(0.0,), sin=(0.0,))
+        scene,
+        lambda _, law: Fourier(mean=float(law.value(fp, 0.0)), omega=1.0, cos=(0.0,), sin=(0.0,)),
     )
 
 

@@ -91,9 +91,7 @@ def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
     if (a.length is None) != (b.length is None):
         by_omega, length = (first, b.length) if a.length is None else (second, a.length)
         assert length is not None
-        return (
-            f"{by_omega} gives omega, so its period is irrational: give it period = {float(length)} instead"
-        )
+        return f"{by_omega} gives omega, so its period is irrational: give it period = {float(length)} instead"
     if laws[first].breakpoints() and laws[second].breakpoints():
         return "repeat the knots of the shorter, or let it rest until the longer ends"
     return (
@@ -134,7 +132,9 @@ def _check(laws: Laws, condition: Condition) -> None:
             raise InvalidScene(_message(laws, condition, verdict.time))
         return
     for p, a, b in _on_legs(condition, legs) if legs else _on_circle(condition):
-        if exact.negative_point(p, a, b) is not None or (condition.is_strict and exact.vanishes(p, a, b)):
+        if exact.negative_point(p, a, b) is not None or (
+            condition.is_strict and exact.vanishes(p, a, b)
+        ):
             raise InvalidScene(_message(laws, condition))
 
 
@@ -145,7 +145,9 @@ class SignVerdict(NamedTuple):
     time: Fraction
 
 
-def sign_on_legs(terms: Terms, is_strict: bool, legs: Iterable[tuple[Fraction, Fraction]]) -> SignVerdict:
+def sign_on_legs(
+    terms: Terms, is_strict: bool, legs: Iterable[tuple[Fraction, Fraction]]
+) -> SignVerdict:
     """Decide whether the sum of sign * product(laws) is > 0 (strict) or >= 0 at all times.
 
     Args:
@@ -230,9 +232,13 @@ def _least(condition: Condition, start: float, span: float, n: int) -> Sequence[
     if not abs(start) + span < 2.0**18 * span:
         return range(n)
     times = start + span * (np.arange(n) / n)
-    sizes = (prod(max(map(abs, law.bounds()[:2])) for law in factors) for _, factors in condition.terms)
+    sizes = (
+        prod(max(map(abs, law.bounds()[:2])) for law in factors) for _, factors in condition.terms
+    )
     with np.errstate(all="ignore"):
-        found = sum(sign * prod(law.values(times) for law in factors) for sign, factors in condition.terms)
+        found = sum(
+            sign * prod(law.values(times) for law in factors) for sign, factors in condition.terms
+        )
         near = np.min(found) + 2.0**-20 * sum(sizes)
     return np.flatnonzero(found <= near).tolist() if near < inf else range(n)
 
@@ -248,11 +254,15 @@ def _message(laws: Laws, condition: Condition, known: Fraction | None = None) ->
         times.append(number(ctx, known))
 
     def excess(t: Any) -> Any:
-        return sum(sign * prod(f.value(ctx, t) for f in factors) for sign, factors in condition.terms)
+        return sum(
+            sign * prod(f.value(ctx, t) for f in factors) for sign, factors in condition.terms
+        )
 
     def shown(x: Any) -> str:
         return str(ctx.nstr(x, 6))
 
     worst = min(times, key=excess)
     places = ", ".join(f"{name} = {shown(law.value(ctx, worst))}" for name, law in laws.items())
-    return f"{condition.text} fails by {shown(excess(worst))} near t = {shown(worst)}, where {places}"
+    return (
+        f"{condition.text} fails by {shown(excess(worst))} near t = {shown(worst)}, where {places}"
+    )

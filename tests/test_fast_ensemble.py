@@ -18,9 +18,7 @@ from fast import prepared
 from fast.ensemble import initial_states
 from scene import BadInput, BangBang, Fourier, Mushroom, State, load
 from scene.geometry import table_at
-from scene.laws import value
 from scene.mouth import mouth_minima, one_cycle, start_time
-from scene.tables import width_factors
 
 
 def test_blocks_are_parts_of_the_whole():
@@ -156,7 +154,7 @@ def stays_along(scene, start, hits):
     vx, vy = start.vx, start.vy
     for wall, (_, t, x, y, *after) in hits:
         if wall == "arc":
-            w = math.prod(float(value(fp, law, t)) for law in width_factors(scene))
+            w = math.prod(float(law.value(fp, t)) for law in scene.width.factors)
             if abs(x * vy - y * vx) > w * math.hypot(vx, vy):
                 begin = min(begin, t)
                 end = math.inf

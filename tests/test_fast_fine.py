@@ -22,7 +22,6 @@ from fast.step import WALL_CODES
 from fast.units import compile_scene
 from scene import BangBang, Cap, Collision, Mushroom, State, Stem, Undecided, load
 from scene.geometry import table_at
-from scene.tables import period
 
 N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "100"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
@@ -59,7 +58,7 @@ def test_generated_steps_are_right_to_31_decimals(tally):
             # Not more shy than the careful step, whose answer it refines, but at once after a bounce.
             assert isinstance(path.outcome, Undecided)
             careful = fast.next_collision(scene, state, t_end)
-            is_soon = isinstance(careful, Collision) and careful.dt < BRIEF * period(scene).value(fp)
+            is_soon = isinstance(careful, Collision) and careful.dt < BRIEF * scene.cycle.value(fp)
             assert isinstance(careful, Undecided) or is_soon or leaves_slowly(scene, state)
             tally["undecided"] += 1
             return

@@ -27,7 +27,7 @@ from scene import (
     Stem,
     Undecided,
 )  # fmt: skip
-from scene.laws import value
+from scene.laws import law_of
 
 # Sides that lean, now more and now less. What bounds them for all time bounds them above the floor alone.
 WAVING = Mushroom(r=1.0, h=1.0, nu=Fourier(0.6, 1.0, (-0.3,)), slope=Fourier(0.1, 1.0, (0.05,)))
@@ -147,7 +147,9 @@ def beside_a_moving_mouth(random: np.random.Generator) -> Question:
     )
     vx, vy = along / s, -y / s
     crossing = CTX.mpf(y) / CTX.mpf(-vy)
-    edge = value(CTX, w, t + crossing) * (1 + random.choice([-1, 1]) * CTX.mpf(2) ** random.uniform(-56, -40))
+    edge = law_of(w).value(CTX, t + crossing) * (
+        1 + random.choice([-1, 1]) * CTX.mpf(2) ** random.uniform(-56, -40)
+    )
     x = float(random.choice([-1, 1]) * edge - CTX.mpf(vx) * crossing)
     return Mushroom(r=1.5, h=1.0, w=w), State(t, x, y, vx, vy), t + 1.01 * s
 

@@ -36,8 +36,7 @@ from fast.prepared import prepare
 from fast.step import WALL_CODES
 from fast.units import compile_scene
 from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, load
-from scene.laws import bounds, value
-from scene.tables import width_factors
+from scene.laws import law_of
 
 N_PATHS = int(os.environ.get("MUSHROOMS_LANE_PATHS", "10"))  # of 128 collisions, in each scene
 
@@ -203,9 +202,9 @@ CTX.dps = 40
 
 def as_rows(scene):
     """Return a scene's laws by the row of their coefficients."""
-    found = {} if isinstance(scene, Stem) else {0: scene.r}
+    found = {} if isinstance(scene, Stem) else {0: scene.laws["r"]}
     if not isinstance(scene, Cap):
-        found |= {1: width_factors(scene)[0], 2: scene.h, 3: scene.slope}
+        found |= {1: scene.width.factors[0], 2: scene.laws["h"], 3: scene.laws["slope"]}
     return found
 
 
@@ -220,10 +219,10 @@ def worst_errors(scene, random, n):
         for row, law in as_rows(scene).items():
             f, rate, _, mean = from_python(law_at)(p.coefficients[piece, row], 0, 1, far, near, degree)
             at = [CTX.mpf(reference) + CTX.mpf(low) + CTX.mpf(u) for u in (near, far)]
-            true = [value(CTX, law, u) for u in at]
+            true = [law_of(law).value(CTX, u) for u in at]
             rates = terms_of_rate(law)
             size = max(abs(v) for v in true) + (row == 3)
-            errors = [abs(f - true[1]) / size, abs(rate - value(CTX, law, at[1], 1)) / rates, 0.0]
+            errors = [abs(f - true[1]) / size, abs(rate - law_of(law).value(CTX, at[1], 1)) / rates, 0.0]
             if near != far:
                 errors[2] = abs(mean - (true[1] - true[0]) / (at[1] - at[0])) / rates
             worst = np.maximum(worst, [float(e) for e in errors])
@@ -236,7 +235,7 @@ def terms_of_rate(law):
         omega = law.omega or 2 * np.pi / law.period
         sizes = [k * (abs(c) + abs(s)) for k, c, s in law.harmonics()]
         return omega * sum(sizes) or 1.0
-    return bounds(law).slope or 1.0
+    return law_of(law).bounds().slope or 1.0
 
 
 @given(scenes(), st.integers(0, 2**32 - 1))
@@ -331,8 +330,8 @@ def worst_of_waves(random, spoilt):
             found = from_python(law_of_waves)(wave, sine, cosine, waves.omega, (0,) * TWO_WAVES)
             sizes = [sum(map(abs, wave)), terms_of_rate(law)]
             for order, size in enumerate(sizes):
-                true = value(CTX, law, at, order)
-                moved = 0.5 * abs(t) * abs(value(CTX, law, at, order + 1))
+                true = law_of(law).value(CTX, at, order)
+                moved = 0.5 * abs(t) * abs(law_of(law).value(CTX, at, order + 1))
                 worst = max(worst, float(abs(found[order] - true) / (size + moved)) * 2.0**53)
     return worst
 

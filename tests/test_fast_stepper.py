@@ -26,7 +26,7 @@ from conformance.cases.draw import Draw
 from conformance.cases.scenes import deep_wave
 from conformance.cases.table import FAMILIES
 from conformance.grading.agreement import compare
-from fast import pieces, step as stepper, units
+from fast import pieces, step as stepper
 from fast.batch import lane_steps
 from fast.kernel import arithmetic, records
 from fast.kernel.records import BAD_QUESTION
@@ -49,7 +49,6 @@ from scene import (
     Undefined,
     load,
 )
-from scene.laws import bounds, size_bounds, values
 from scene.states import check_numbers
 
 
@@ -400,7 +399,7 @@ def test_no_answer_is_wrong(name, seed, tally):
 @pytest.mark.usefixtures("uncached")
 def test_between_deep_waves_some_answers_hang_on_the_bounds(monkeypatch):
     """With the bounds of a law that may be negative they are wrong."""
-    monkeypatch.setattr(units, "size_bounds", bounds)
+    monkeypatch.setattr(Fourier, "size_bounds", Fourier.bounds)
     assert attack("deep-waves", N_ATTACKS, 2).cases["wrong"] != []
 
 
@@ -410,12 +409,13 @@ def test_the_least_of_a_size_is_positive_and_below_all_values():
         draw = Draw(f"deep/{index}")
         high = draw.power(-10, 10)
         law = deep_wave(draw, high * draw.power(-10, -4), high, 2.0 * math.pi)
-        assert bounds(law).lowest < 0.0 < size_bounds(law).lowest <= values(law, times).min() * (1.0 + 1e-12)
+        assert law.bounds().lowest < 0.0 < law.size_bounds().lowest
+        assert law.size_bounds().lowest <= law.values(times).min() * (1.0 + 1e-12)
 
 
 def test_what_samples_do_not_show_to_be_positive_is_told_to_be_0():
     touching = Fourier(mean=1.0, omega=1.0, cos=(1.0 - 2.0**-53,))
-    assert bounds(touching).lowest < size_bounds(touching).lowest == 0.0
+    assert touching.bounds().lowest < touching.size_bounds().lowest == 0.0
     scene = Cap(r=touching)
     assert pieces.pieces_of(scene, compile_scene(scene), pieces.SERIES) is None  # lanes know nothing of it
     start = State(0.0, 0.5, 0.5, 30.0, 40.0)

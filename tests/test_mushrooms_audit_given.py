@@ -39,7 +39,6 @@ from mushrooms.audit.ensemble_command import EnsembleAudit
 from mushrooms.audit.ensemble_table import Reading
 from scene import Fourier, Mushroom, load
 from scene.geometry import table_at
-from scene.laws import value
 
 SCENE, ENERGY = load("moving-cap"), 1e6
 CLOCK = load("fixed-cap-anticlockwise")  # of period 1
@@ -522,5 +521,5 @@ def test_sums_of_cycles_are_held_to_theory(monkeypatch):
 
 def test_nu_is_that_of_the_scene():
     times = np.array([0.0, 1.0, 2.5])
-    assert nu_at(SCENE, times) == pytest.approx([float(value(fp, SCENE.nu, t)) for t in times])
+    assert nu_at(SCENE, times) == pytest.approx([float(SCENE.laws["nu"].value(fp, t)) for t in times])
     assert cycle_start(SCENE) == pytest.approx(0.0, abs=1e-9)

@@ -28,8 +28,6 @@ from mushrooms.audit.runs import RUNS, Sample, draw, scene_of
 from mushrooms.figures import style
 from mushrooms.figures.energies import ROOM
 from scene import load
-from scene.laws import value
-from scene.tables import laws
 
 N = 250  # particles of a run
 N_DRAWN = 6_000  # sums of cycles
@@ -128,7 +126,7 @@ def test_loops_run_in_their_direction_with_marks_at_their_phases(
         now = theory.volumes_at(fp, scene, t)
         place = (now.v_ell / now.v_cap, now.v_cap / (now.v_cap + now.v_stem))
         if not name:
-            place = tuple(value(fp, laws(scene)[law], t) for law in "wh")
+            place = tuple(scene.laws[law].value(fp, t) for law in "wh")
         mark = line(axes, f"{k}/6")
         assert [float(one[0]) for one in xy(mark)] == pytest.approx(place, abs=1e-9)
         assert mark.get_color() == colour
@@ -387,7 +385,7 @@ def test_releases_are_in_units_of_the_speed(
 ) -> None:
     left, right = figure("L4").axes
     samples = [sample(f"moving-cap@1e{k}") for k in range(4, 9)]
-    nu, gaps = np.vectorize(partial(value, fp, load("moving-cap").nu)), []
+    nu, gaps = np.vectorize(partial(load("moving-cap").laws["nu"].value, fp)), []
     for one in samples:
         begin, end = (t[np.isfinite(one.t_in[:, 0, 0]), 0, 0] for t in (one.t_in, one.t_out))
         gaps.append(nu(end) - nu(begin))

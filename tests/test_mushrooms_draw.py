@@ -28,7 +28,6 @@ from mushrooms.figures.heating import Loop, fastest, moving_cap, phase_diagram, 
 from mushrooms.reports.page import as_json, typeset
 from scene import BangBang, Mushroom, load
 from scene.geometry import table_at
-from scene.laws import value
 
 STATIC = scenes.load("frozen-mushroom")
 MOVING = scenes.load("moving-cap")
@@ -83,9 +82,9 @@ def test_the_section_is_eq_sinphi_before_the_bounce(moving):
         k = int(section.collision[3])
         _, _, _, vx, vy = states[k]
         t, x, y, _, _ = states[k + 1]
-        r = float(value(fp, MOVING.r, t))
+        r = float(MOVING.laws["r"].value(fp, t))
         assert section.sin_phi[3] == pytest.approx(theory.sin_phi_hat(np, x, y, vx, vy, r), rel=1e-12)
-        assert section.nu[3] == pytest.approx(float(value(fp, MOVING.nu, t)), rel=1e-12)
+        assert section.nu[3] == pytest.approx(float(MOVING.laws["nu"].value(fp, t)), rel=1e-12)
         assert np.all((section.place >= 0) & (section.place <= 1) & (np.abs(section.sin_phi) <= 1 + 1e-12))
 
 
@@ -125,7 +124,7 @@ def test_energies_follow_theory_given_the_stays():
         )  # a particle's own wander, about E^(-1/4) in size
     captive = whispering(scenes.load("breathing-circle"))
     first, last = captive.states()[[0, -1], 0]
-    ratio = value(fp, captive.scene.r, first) / value(fp, captive.scene.r, last)
+    ratio = captive.scene.laws["r"].value(fp, first) / captive.scene.laws["r"].value(fp, last)
     assert captive.adiabatic()[-1] == pytest.approx(2 * math.log(ratio), rel=1e-9)
     with pytest.raises(theory.NotCovered):
         orbits.follow(scenes.load("fermi-ulam"), 10)[0].adiabatic()
@@ -259,7 +258,7 @@ def test_the_section_of_a_stem_is_phase_and_velocity():
     at_floor = np.flatnonzero(np.array(orbit.walls) == "floor")
     states, (phase, velocity) = orbit.states(), orbit.phase_section().T
     assert velocity.tolist() == states[at_floor + 1, 4].tolist()
-    rate = np.array([float(value(fp, stem.h, t * stem.period, 1)) for t in phase])
+    rate = np.array([float(stem.laws["h"].value(fp, t * stem.period, 1)) for t in phase])
     assert velocity == pytest.approx(-states[at_floor, 4] - 2 * rate, abs=1e-9)
     depth, speed = orbit.phase_section(0.5).T
     assert depth == pytest.approx(orbit.at(orbit.instants(0.5))[:, 1])

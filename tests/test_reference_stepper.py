@@ -35,7 +35,7 @@ from scene import (
     Undecided,
     load,
 )
-from scene.laws import value
+from scene.laws import law_of
 
 
 def hit(scene, state, t_end=100.0, digits=40):
@@ -341,7 +341,7 @@ def hops(rng):
     t = rng.uniform(-3.0, 3.0)
     angle = rng.uniform(0.05, 0.2)
     lift = rng.uniform(0.02, 0.1)
-    now = float(value(fp, r, t))
+    now = float(law_of(r).value(fp, t))
     off = 1.0 + rng.uniform(-1.0, 1.0) * 2.0**-24
     x, y = now * off * math.cos(angle), now * off * math.sin(angle)
     return Cap(r=r), State(t, x, y, -4.0 * math.sin(angle + lift), 4.0 * math.cos(angle + lift), "arc")
@@ -392,7 +392,7 @@ def test_at_a_knot_the_sensitivity_is_that_of_the_steeper_side(time):
     law = BangBang(((0.0, 1.0), (1.0, 0.6), (1.5, 0.85), (4.0, 1.0)))
     begin = time - 0.75
     v = 0.9
-    x = v * (time - begin) - float(value(fp, law, time))
+    x = v * (time - begin) - float(law_of(law).value(fp, time))
     starts = [State(begin + k * math.ulp(begin), x, -0.5, -v, 0.01) for k in range(-3, 4)]
     found = [proved_step(Mushroom(r=2.0, h=2.0, w=law, slope=0.0), s, 10.0).steps[0] for s in starts]
     times = [Fraction(s.t) + step.centre("dt") for s, step in zip(starts, found, strict=True)]

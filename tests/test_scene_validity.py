@@ -32,10 +32,9 @@ from scene import (
 )
 from scene.exact import leg_intervals
 from scene.geometry import area, rounded, table_at
-from scene.laws import bounds, breakpoints, shared_period, value, values
+from scene.laws import law_of, shared_cycle
 from scene.mouth import mouth_minima
 from scene.pieces import exact
-from scene.tables import laws as laws_of, period
 from scene.validity import sign_on_legs
 
 UP = math.nextafter(1.0, 2.0)
@@ -137,14 +136,14 @@ CTX.dps = 30
 
 def least_margin(found):
     """The smallest of all conditions of a mushroom with these laws over dense sampling, at 30 digits."""
-    shared = shared_period(found.values())
+    shared = shared_cycle(map(law_of, found.values()))
     times = [CTX.mpf(0)]
     if shared is not None:
         times = [shared.value(CTX) * k / N_SAMPLES for k in range(N_SAMPLES)]
-        times += [exact(CTX, t) for law in found.values() for t in breakpoints(law)]
+        times += [exact(CTX, t) for law in found.values() for t in law_of(law).breakpoints()]
     least = CTX.inf
     for t in times:
-        at = {name: value(CTX, law, t) for name, law in found.items()}
+        at = {name: law_of(law).value(CTX, t) for name, law in found.items()}
         w = at["w"] if "w" in at else at["nu"] * at["r"]
         least = min(least, at["r"], at["h"], w, at["r"] - w, w - at["h"] * at["slope"])
     return least
@@ -152,7 +151,7 @@ def least_margin(found):
 
 def most_missed(given):
     """How far a condition may dip between two samples: bound on its curvature times spacing^2 / 8."""
-    shared = shared_period(given.values())
+    shared = shared_cycle(map(law_of, given.values()))
     if shared is None:
         return 0.0
 
@@ -160,7 +159,7 @@ def most_missed(given):
         size_f, size_g = (max(abs(law.lowest), abs(law.highest)) for law in (f, g))
         return f.curvature * size_g + 2 * f.slope * g.slope + size_f * g.curvature
 
-    found = {name: bounds(law) for name, law in given.items()}
+    found = {name: law_of(law).bounds() for name, law in given.items()}
     bend_w = found["w"].curvature if "w" in found else product(found["nu"], found["r"])
     bends = bend_w + found["r"].curvature + found["h"].curvature + product(found["h"], found["slope"])
     return bends * float(shared.value(CTX) / N_SAMPLES) ** 2 / 8
@@ -195,7 +194,7 @@ def test_the_catalogue_is_valid(name):
     assert scene.name == name
     assert scene.notes
     if isinstance(scene, Mushroom):
-        assert least_margin(laws_of(scene)) > -1e-25
+        assert least_margin(scene.laws) > -1e-25
 
 
 def test_the_moving_cap_as_printed_is_refused():
@@ -250,7 +249,7 @@ def rational(x: Fraction):
 
 def exactly(law, t: Fraction):
     """Evaluate a law, all but exactly."""
-    return value(FINE, law, rational(t))
+    return law_of(law).value(FINE, rational(t))
 
 
 def random_laws(draw: random.Random):
@@ -398,9 +397,10 @@ ROUNDING = 2.0**-42
 def mouth(scene, phases):
     """Return nu at phases of the cycle, which begins with the first knot, or at time 0."""
     start = next((law.knots[0][0] for law in (scene.r, scene.w, scene.nu) if isinstance(law, BangBang)), 0.0)
-    shared = period(scene)
+    shared = scene.cycle
     times = start + (float(shared.value(fp)) if shared else 1.0) * phases
-    return values(scene.nu, times) if scene.w is None else values(scene.w, times) / values(scene.r, times)
+    laws = scene.laws
+    return laws["nu"].values(times) if "nu" in laws else laws["w"].values(times) / laws["r"].values(times)
 
 
 def fault(scene, found, n_samples=N_PHASES):

@@ -79,7 +79,13 @@ class StopRequest(_Request, frozen=True, tag="stop"):
 
 
 Command = (
-    StartRequest | EchoRequest | StepRequest | TrajectoryRequest | FlowRequest | TimeRequest | StopRequest
+    StartRequest
+    | EchoRequest
+    | StepRequest
+    | TrajectoryRequest
+    | FlowRequest
+    | TimeRequest
+    | StopRequest
 )
 
 
@@ -216,7 +222,9 @@ def json_schema() -> dict[str, Any]:
     )
     limit_definitions(definitions)
     published = {name: name.removesuffix("Request") for name in definitions}
-    definitions = {published[name]: {**kind, "title": published[name]} for name, kind in definitions.items()}
+    definitions = {
+        published[name]: {**kind, "title": published[name]} for name, kind in definitions.items()
+    }
     tables = ("Cap", "Stem", "Mushroom")
     scene = {"anyOf": [_reference(name) for name in tables]}
     definitions["Trajectory"]["properties"]["collisions"]["minimum"] = 0
@@ -225,9 +233,15 @@ def json_schema() -> dict[str, Any]:
     for request in (StepRequest, TrajectoryRequest, FlowRequest, TimeRequest):
         definitions[published[request.__name__]]["properties"]["scene"] = scene
     # A step is answered by an outcome that carries the seq of the request (null where it had none).
-    seq = {"type": "object", "properties": {"seq": {"type": ["integer", "null"]}}, "required": ["seq"]}
+    seq = {
+        "type": "object",
+        "properties": {"seq": {"type": ["integer", "null"]}},
+        "required": ["seq"],
+    }
     definitions["Request"] = {"anyOf": [_reference(published[kind.__name__]) for kind in requests]}
-    stepped = {"allOf": [seq, {"anyOf": [_reference(published[kind.__name__]) for kind in outcomes]}]}
+    stepped = {
+        "allOf": [seq, {"anyOf": [_reference(published[kind.__name__]) for kind in outcomes]}]
+    }
     definitions["Answer"] = {"anyOf": [stepped, *(_reference(kind.__name__) for kind in answers)]}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -37,7 +37,15 @@ PI = Fraction(
 
 TABLES: dict[str, type[msgspec.Struct]] = {"cap": Cap, "stem": Stem, "mushroom": Mushroom}
 KINDS: dict[str, type[msgspec.Struct]] = {str(kind.__struct_config__.tag): kind for kind in WRITTEN}
-OPTIONAL = {"slope", "w", "nu", "omega", "period", "cos", "sin"}  # null stands for an absent one, if ignored
+OPTIONAL = {
+    "slope",
+    "w",
+    "nu",
+    "omega",
+    "period",
+    "cos",
+    "sin",
+}  # null stands for an absent one, if ignored
 
 Part = Literal["scene", "law", "state", "request", "answer"]
 
@@ -86,16 +94,26 @@ class ProtocolRule(NamedTuple):
 
 
 RULES = (
-    ProtocolRule("known-table", "scene", "`table` is cap, stem or mushroom", Duty.REJECT, in_schema=True),
-    ProtocolRule("whole-scene", "scene", "no required field is missing", Duty.REJECT, in_schema=True),
+    ProtocolRule(
+        "known-table", "scene", "`table` is cap, stem or mushroom", Duty.REJECT, in_schema=True
+    ),
+    ProtocolRule(
+        "whole-scene", "scene", "no required field is missing", Duty.REJECT, in_schema=True
+    ),
     ProtocolRule("scene-types", "scene", "each field has its type", Duty.REJECT, in_schema=True),
     ProtocolRule(
-        "one-mouth", "scene", "a mushroom gives exactly one of `w` and `nu`", Duty.REJECT, in_schema=True
+        "one-mouth",
+        "scene",
+        "a mushroom gives exactly one of `w` and `nu`",
+        Duty.REJECT,
+        in_schema=True,
     ),
     ProtocolRule("sizes", "scene", "r, h, w > 0 at all times", Duty.REJECT),
     ProtocolRule("mouth-in-base", "scene", "w <= r at all times", Duty.REJECT),
     ProtocolRule("sides-apart", "scene", "w > h slope at all times", Duty.REJECT),
-    ProtocolRule("one-period", "scene", "all laws that move have exactly the same period", Duty.REJECT),
+    ProtocolRule(
+        "one-period", "scene", "all laws that move have exactly the same period", Duty.REJECT
+    ),
     ProtocolRule(
         "known-scene-fields",
         "scene",
@@ -122,9 +140,15 @@ RULES = (
         " question.",
         in_schema=True,
     ),
-    ProtocolRule("known-kind", "law", "`kind` is fourier or bang-bang", Duty.REJECT, in_schema=True),
     ProtocolRule(
-        "one-rate", "law", "exactly one of `omega` and `period` is given", Duty.REJECT, in_schema=True
+        "known-kind", "law", "`kind` is fourier or bang-bang", Duty.REJECT, in_schema=True
+    ),
+    ProtocolRule(
+        "one-rate",
+        "law",
+        "exactly one of `omega` and `period` is given",
+        Duty.REJECT,
+        in_schema=True,
     ),
     ProtocolRule(
         "positive-rate",
@@ -155,11 +179,19 @@ RULES = (
         " 1.1 - 0.1 is no binary64 number.",
     ),
     ProtocolRule(
-        "known-law-fields", "law", "the kind has each of the law's fields", Duty.IGNORE, in_schema=True
+        "known-law-fields",
+        "law",
+        "the kind has each of the law's fields",
+        Duty.IGNORE,
+        in_schema=True,
     ),
-    ProtocolRule("whole-state", "state", "no required field is missing", Duty.REJECT, in_schema=True),
+    ProtocolRule(
+        "whole-state", "state", "no required field is missing", Duty.REJECT, in_schema=True
+    ),
     ProtocolRule("state-types", "state", "each field has its type", Duty.REJECT, in_schema=True),
-    ProtocolRule("known-wall", "state", "`wall` is null or the name of a wall", Duty.REJECT, in_schema=True),
+    ProtocolRule(
+        "known-wall", "state", "`wall` is null or the name of a wall", Duty.REJECT, in_schema=True
+    ),
     ProtocolRule("own-wall", "state", "the table has the wall that is named", Duty.REJECT),
     ProtocolRule("inside", "state", "the particle is not beyond a wall", Duty.REJECT),
     ProtocolRule(
@@ -169,7 +201,10 @@ RULES = (
         Duty.REJECT,
     ),
     ProtocolRule(
-        "before-its-end", "state", "the particle is not past the end of the wall that it names", Duty.REJECT
+        "before-its-end",
+        "state",
+        "the particle is not past the end of the wall that it names",
+        Duty.REJECT,
     ),
     ProtocolRule(
         "leaves-its-wall",
@@ -215,9 +250,15 @@ RULES = (
         Duty.IGNORE,
         in_schema=True,
     ),
-    ProtocolRule("known-command", "request", "`cmd` is one of this page", Duty.REJECT, in_schema=True),
-    ProtocolRule("whole-request", "request", "no required field is missing", Duty.REJECT, in_schema=True),
-    ProtocolRule("request-types", "request", "each field has its type", Duty.REJECT, in_schema=True),
+    ProtocolRule(
+        "known-command", "request", "`cmd` is one of this page", Duty.REJECT, in_schema=True
+    ),
+    ProtocolRule(
+        "whole-request", "request", "no required field is missing", Duty.REJECT, in_schema=True
+    ),
+    ProtocolRule(
+        "request-types", "request", "each field has its type", Duty.REJECT, in_schema=True
+    ),
     ProtocolRule("finite", "request", "each number is finite in binary64", Duty.REJECT),
     ProtocolRule(
         "sequence", "request", "`seq` is a whole number from 0 to 2^53", Duty.REJECT, in_schema=True
@@ -240,7 +281,11 @@ RULES = (
         " that must be rejected is rejected.",
     ),
     ProtocolRule(
-        "known-request-fields", "request", "the command has each of the fields", Duty.IGNORE, in_schema=True
+        "known-request-fields",
+        "request",
+        "the command has each of the fields",
+        Duty.IGNORE,
+        in_schema=True,
     ),
     ProtocolRule(
         "fields-once",
@@ -257,9 +302,14 @@ RULES = (
         "The suite would have to choose one of two values. This holds for unknown fields, too.",
     ),
     ProtocolRule("same-seq", "answer", "`seq` is that of the request", Duty.WRONG_FORMAT),
-    ProtocolRule("finite-answers", "answer", "each number is finite in binary64", Duty.WRONG_FORMAT),
     ProtocolRule(
-        "capture-at-the-end", "answer", "only an entry `horizon` has a capture interval", Duty.WRONG_FORMAT
+        "finite-answers", "answer", "each number is finite in binary64", Duty.WRONG_FORMAT
+    ),
+    ProtocolRule(
+        "capture-at-the-end",
+        "answer",
+        "only an entry `horizon` has a capture interval",
+        Duty.WRONG_FORMAT,
     ),
 )
 BY_NAME = {rule.name: rule for rule in RULES}
@@ -323,7 +373,11 @@ def without_loose(data: Any) -> tuple[Any, bool]:
 
 def _fields_of(data: Any, tag: str, forms: Mapping[str, type[msgspec.Struct]]) -> tuple[str, ...]:
     """Return the fields that an object may have by its tag; none where it is no object of any form."""
-    form = forms.get(data[tag]) if isinstance(data, Mapping) and isinstance(data.get(tag), str) else None
+    form = (
+        forms.get(data[tag])
+        if isinstance(data, Mapping) and isinstance(data.get(tag), str)
+        else None
+    )
     return (tag, *form.__struct_fields__) if form else ()
 
 

@@ -112,7 +112,10 @@ class _Server:
 
     def introduce(self, command: StartRequest) -> dict[str, Any]:
         if command.protocol != PROTOCOL:
-            return {"seq": None, **_plain(Rejected(f"protocol = {command.protocol}, must be {PROTOCOL}"))}
+            return {
+                "seq": None,
+                **_plain(Rejected(f"protocol = {command.protocol}, must be {PROTOCOL}")),
+            }
         offered = {"step": True, "trajectory": True, "flow": self.flow, "time": self.timer}
         return {
             "protocol": PROTOCOL,
@@ -124,7 +127,9 @@ class _Server:
             "laws": ["constant", *(kind.__struct_config__.tag for kind in WRITTEN)],
         }
 
-    def answer(self, command: StepRequest | TrajectoryRequest | FlowRequest | TimeRequest) -> dict[str, Any]:
+    def answer(
+        self, command: StepRequest | TrajectoryRequest | FlowRequest | TimeRequest
+    ) -> dict[str, Any]:
         try:
             scene = _read_scene(bytes(command.scene))
             if isinstance(command, StepRequest):
@@ -149,7 +154,9 @@ class _Server:
             raise BadInput("flow is not among this implementation's profiles")
         check_count("number of states", len(command.states), 0, MAX_STATES)
         arrivals = self.flow(scene, command.states, command.t_end)
-        return {"states": [{**_plain(outcome), "captured": captured} for outcome, captured in arrivals]}
+        return {
+            "states": [{**_plain(outcome), "captured": captured} for outcome, captured in arrivals]
+        }
 
     def answer_time(self, scene: Scene, command: TimeRequest) -> dict[str, Any]:
         if self.timer is None:

@@ -18,8 +18,7 @@ from mushrooms.audit.claims.finite_energy import DRAWN_SEED, summed
 from mushrooms.audit.runs import RUNS, Sample, scene_of
 from mushrooms.audit.tolerances import N_SIGMA
 from scene import load
-from scene.laws import bounds, value
-from scene.tables import laws
+from scene.laws import law_of
 
 N_DRAWN = 100_000  # as the tests have it
 INFINITE = 1e40
@@ -177,8 +176,8 @@ class Numbers:
         end = np.fmin.reduce(one.t_out[:, 0], axis=1)
         inside = (begin < first) & (end > last)
         change = one.phase_s[inside, 0, 8] - one.phase_s[inside, 0, 6]
-        rise = math.log(value(fp, scene.r, last) / value(fp, scene.r, first))
-        band = 2 * float(bounds(scene.r).slope) / (2e7) ** 0.5 / abs(rise)
+        rise = math.log(scene.laws["r"].value(fp, last) / scene.laws["r"].value(fp, first))
+        band = 2 * float(scene.laws["r"].bounds().slope) / (2e7) ** 0.5 / abs(rise)
         return {**mean(-change / rise), "expected": 2.0 if "r²" in what else 1.0, "band": band}
 
     def extra_variance(self, run: str) -> Wanted:
@@ -427,7 +426,7 @@ class Numbers:
         begin = np.fmin.reduce(one.t_in[:, 0], axis=1)
         end = np.fmin.reduce(one.t_out[:, 0], axis=1)
         inside = (begin < first) & (end > last)
-        cap = 2 * math.log(value(fp, r, last) / value(fp, r, first))
+        cap = 2 * math.log(law_of(r).value(fp, last) / law_of(r).value(fp, first))
         return one.phase_s[inside, 0, 8] - one.phase_s[inside, 0, 6] + cap
 
     def volume_change(self, run: str, phase: float) -> float:
@@ -441,7 +440,7 @@ class Numbers:
         ladder = [f"moving-cap@1e{k}" for k in range(4, 9)]
         ergodic = [f"ergodic@1e{k}" for k in range(4, 8)]
         if what.startswith("moving-cap@1e7"):
-            arc = float(bounds(load("moving-cap").r).slope)
+            arc = float(load("moving-cap").laws["r"].bounds().slope)
             return {**mean(self.cap_change("moving-cap@1e7")), "expected": 0.0, "band": 2 * arc / 2e7**0.5}
         if what.startswith("log(E V_cap)"):
             rows = [spread(self.cap_change(run)) for run in ladder]
@@ -478,7 +477,7 @@ class Numbers:
 
     def late(self, run: str) -> float:
         """Return the longest time between hits of the arc."""
-        return float(2 * bounds(laws(scene_of(RUNS[run]))["r"]).highest) / (2 * RUNS[run].energy) ** 0.5
+        return float(2 * scene_of(RUNS[run]).laws["r"].bounds().highest) / (2 * RUNS[run].energy) ** 0.5
 
     def zone_energy(self, run: str, phase: str) -> Wanted:
         """L5: mean log E of those not captured so far."""

@@ -11,7 +11,7 @@ from mpmath import fp
 from conformance.suite.process import CheckFailure
 from scene import Mushroom, from_data
 from scene.geometry import TableAt, rounded as table_of
-from scene.laws import GivenLaw, bounds, value
+from scene.laws import GivenLaw, law_of
 from support.faulty_steppers import (
     FLOW,
     NUMBERS,
@@ -310,7 +310,7 @@ def passes_samples(request: Line, _: Line, why: str, *, n: int) -> bool:
     try:
         laws = {k: msgspec.convert(v, GivenLaw) for k, v in data.items() if k not in WORDS}
         for i in range(n):
-            now = {name: float(value(fp, law, i / n)) for name, law in laws.items()}
+            now = {name: float(law_of(law).value(fp, i / n)) for name, law in laws.items()}
             from_data({"table": data["table"], **now})
     except (ValueError, AttributeError):
         return False
@@ -321,7 +321,11 @@ def wide_by_ranges(request: Line) -> bool:
     """Compare the widest mouth with the smallest cap."""
     scene = from_data(request["scene"])
     w = getattr(scene, "w", None)
-    return isinstance(scene, Mushroom) and w is not None and bounds(w).highest > bounds(scene.r).lowest
+    return (
+        isinstance(scene, Mushroom)
+        and w is not None
+        and law_of(w).bounds().highest > scene.laws["r"].bounds().lowest
+    )
 
 
 # Lax reading.

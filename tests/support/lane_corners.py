@@ -12,7 +12,7 @@ from mpmath import fp
 from fast.kernel import records
 from fast.kernel.records import FloatArray
 from scene import BangBang, Cap, Fourier, GivenLaw, Mushroom, Scene
-from scene.laws import value
+from scene.laws import law_of
 from support.lane_anywhere import Start
 
 
@@ -120,7 +120,7 @@ def _offset(random: np.random.Generator, farthest: float = -8) -> float:
 
 
 def _at(law: GivenLaw, t: float) -> float:
-    return float(value(fp, law, float(t)))
+    return float(law_of(law).value(fp, float(t)))
 
 
 def _state(t: float, s: float, x: float, y: float, x_end: float, y_end: float) -> FloatArray:

@@ -16,8 +16,7 @@ from fast.kernel import records
 from fast.kernel.records import FloatArray
 from scene import BangBang, Fourier, GivenLaw, Mushroom, Wall
 from scene.geometry import TableAt, half_width, table_at
-from scene.laws import is_constant, values
-from scene.tables import laws
+from scene.laws import law_of
 from support.lane_anywhere import Start
 
 N_CROWD = 1500
@@ -79,7 +78,7 @@ def _moving(swing: float, random: np.random.Generator) -> GivenLaw:
 def draw_crowd(scene: Mushroom, aim: Aim, random: np.random.Generator) -> FloatArray:
     """Draw many starts on the wall of an aim; rows t, x, y, vx, vy, and how far they are looked at."""
     n = N_CROWD
-    (moving,) = (law for law in laws(scene).values() if not is_constant(law))
+    (moving,) = (law for law in scene.laws.values() if not law.is_constant)
     is_smooth = isinstance(moving, Fourier)
     period, ahead = (2.0 * np.pi, LOOK_AHEAD) if is_smooth else (1.0, 0.3)
     t = random.uniform(0.0, period, n)
@@ -163,7 +162,7 @@ def chords(
 def pace_of_arc(scene: Mushroom, t: FloatArray) -> FloatArray:
     """Return the speed of particles at which the arc's function is just concave."""
     now = table_at(fp, scene, t)
-    return np.asarray(np.sqrt(np.abs(now.r_rate**2 + now.r * values(scene.r, t, 2))))
+    return np.asarray(np.sqrt(np.abs(now.r_rate**2 + now.r * scene.laws["r"].values(t, 2))))
 
 
 def slipping(
@@ -183,14 +182,14 @@ def slipping(
     """
     n = len(t)
     part = np.arange(1, 49) / 48.0
-    r, rate, bend = (values(law, t, order) for order in range(3))
+    r, rate, bend = (law_of(law).values(t, order) for order in range(3))
     u = s[:, None] * part
-    slope = (values(law, t[:, None] + u) ** 2 - r[:, None] ** 2) / u - 2.0 * (r * rate)[:, None]
+    slope = (law_of(law).values(t[:, None] + u) ** 2 - r[:, None] ** 2) / u - 2.0 * (r * rate)[:, None]
     v2 = np.maximum((slope / u)[np.arange(n), random.integers(0, 48, n)], 1e-9)
     dip = slope - v2[:, None] * u  # P(u) - P(0)
     least = dip.min(axis=1)
     parabola = (rate**2 + r * bend - v2) * s
-    room = np.maximum(values(law, t + s) ** 2 - widest**2, 0.0) / s
+    room = np.maximum(law_of(law).values(t + s) ** 2 - widest**2, 0.0) / s
     most = np.minimum(np.minimum(dip[:, -1] - room, 0.0), parabola)
     q = r * rate + 0.5 * (most + (least - most) * 10.0 ** random.uniform(-2, 0, n))
     out = q / r

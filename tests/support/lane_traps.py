@@ -25,7 +25,7 @@ from mpmath import fp
 from fast.kernel import records
 from fast.kernel.records import FloatArray
 from scene import BangBang, Fourier, GivenLaw, Mushroom, Scene
-from scene.laws import value
+from scene.laws import law_of
 from support.lane_anywhere import Group, Start
 
 N_CROWD = 4_000
@@ -167,8 +167,8 @@ def _radius(random: np.random.Generator) -> GivenLaw:
 
 def _start(r: GivenLaw, random: np.random.Generator) -> Start:
     t = 0.0 if random.random() < 0.3 else float(10.0 ** random.uniform(-12, 0))
-    now = float(value(fp, r, t))
-    rate = float(value(fp, r, t, 1))
+    now = float(law_of(r).value(fp, t))
+    rate = float(law_of(r).value(fp, t, 1))
     off = 0.0 if random.random() < 0.3 else float(10.0 ** random.uniform(-12, 0))
     angle = 0.5 * np.pi - off if random.random() < 0.8 else off + 1e-3
     along = float(random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-1, 3))
@@ -207,8 +207,8 @@ def slow_beside_a_plateau(n: int, random: np.random.Generator) -> tuple[Scene, l
         is_quick = random.random() < 0.5
         along = 10.0 ** random.uniform(-0.5, 0.7) if is_quick else speed * random.random()
         s = min(speed, 0.5 / along) * 10.0 ** random.uniform(-3, -1)
-        there = float(value(fp, law, t + s))
-        rate = float(value(fp, law, t + s, 1))
+        there = float(law_of(law).value(fp, t + s))
+        rate = float(law_of(law).value(fp, t + s, 1))
         if is_floor:
             place = (1.0, (speed + rate) * s - there, -along, -speed - rate)
             wall = records.RIGHT
@@ -237,7 +237,7 @@ def across_a_slope_near_zero(n: int, random: np.random.Generator) -> tuple[Scene
     for _ in range(n):
         t = phase + float(2.0 * np.pi * random.integers(0, 2) + random.uniform(-0.06, -0.01))
         y = -float(random.uniform(0.002, 0.018))
-        m = float(value(fp, slope, t))
+        m = float(law_of(slope).value(fp, t))
         vx = float(random.uniform(10.0, 40.0))
         vy = float(random.choice([-1, 1]) * 10.0 ** random.uniform(-4, -1))
         starts.append((np.array([t, 0.0, -(0.5 + m * y), y, vx, vy]), int(records.LEFT)))

@@ -14,8 +14,6 @@ from conformance.cases.certify import proved_step
 from conformance.grading.agreement import middle
 from reference.arithmetic import Enclosure
 from scene import Scene, State
-from scene.laws import bounds
-from scene.tables import laws
 
 __all__ = ["IS_DEEP", "centre", "certified_answer", "is_delicate", "jacobian_error", "proved_step"]
 
@@ -44,8 +42,8 @@ def jacobian_error(scene: Scene, start: State, walls: list[str]) -> float:
 
 def is_delicate(scene: Scene, state: State, t_end: float) -> bool:
     """Tell whether nudging the state changes the kind of its outcome, the wall, or dt greatly."""
-    size = max(bounds(law).highest for name, law in laws(scene).items() if name in ("r", "w", "h"))
-    speed = abs(state.vx) + abs(state.vy) + max(bounds(law).slope for law in laws(scene).values())
+    size = max(law.bounds().highest for name, law in scene.laws.items() if name in ("r", "w", "h"))
+    speed = abs(state.vx) + abs(state.vy) + max(law.bounds().slope for law in scene.laws.values())
     seen, times = set(), []
     for field, scale in (("x", size), ("y", size), ("vx", speed), ("vy", speed)):
         for nudge in (-NUDGE * scale, 0.0, NUDGE * scale):

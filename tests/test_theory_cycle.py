@@ -1,5 +1,6 @@
 """Secs. 3.2 to 3.5: falls and rises of nu, capture and release; several captures a cycle, identities."""
 
+import dataclasses
 import importlib
 import re
 from fractions import Fraction
@@ -14,11 +15,13 @@ from mpmath import MPContext
 from numpy.typing import NDArray
 from support.depth import deep_but
 
-from scene import BangBang, Fourier, InvalidScene, Mushroom, load
+from scene import BangBang, Constant, Fourier, InvalidScene, Law, Mushroom, load
+from scene.pieces import Period, PolynomialPiece
 from scene.transforms import scaled
 from theory import (
     Cycle,
     Energies,
+    NotCovered,
     capture_curve,
     capture_time_mass,
     chaotic_zone,
@@ -97,6 +100,31 @@ def test_width_over_radius_is_the_same_cycle_as_nu(length: int) -> None:
     for nu in ("0.3", "0.5", "0.7"):
         assert abs(by_w.t_in(ctx.mpf(nu)) - by_nu.t_in(ctx.mpf(nu))) < ctx.mpf(10) ** -45
         assert abs(by_w.t_out(ctx.mpf(nu)) - by_nu.t_out(ctx.mpf(nu))) < ctx.mpf(10) ** -45
+
+
+class Cubic(Law, frozen=True):
+    """A law of a kind that there is not: 1 + t^3 for a time 2."""
+
+    cycle = Period(None, Fraction(2))
+    is_polynomial = True
+
+    def breakpoints(self) -> list[Fraction]:
+        """Return both ends."""
+        return [Fraction(0), Fraction(2)]
+
+    def piece_at(self, time: Fraction) -> PolynomialPiece:
+        """Return the first piece."""
+        coefficients = tuple(map(Fraction, (1, 0, 0, 1)))
+        return PolynomialPiece(Fraction(0), coefficients, Fraction(2))
+
+
+def test_a_cubic_over_a_parabola_is_not_covered() -> None:
+    ramp = BangBang(knots=((0.0, 0.5), (1.0, 0.75), (2.0, 0.5)))
+    plain = prepare(Mushroom(r=1.0, h=1.0, nu=ramp))
+    cubic = dataclasses.replace(plain, mouth=(Cubic(), Constant(1.0)), jointed=(Cubic(),))
+    assert len(spans(MPContext(), cubic)) == 1
+    with pytest.raises(NotCovered, match="a cubic at most"):
+        spans(MPContext(), dataclasses.replace(cubic, mouth=(Cubic(), ramp)))
 
 
 def test_bang_bang_width_and_radius_turn_between_knots() -> None:

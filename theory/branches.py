@@ -32,7 +32,7 @@ from theory.adiabatic import Captures, Placed, SolvedWell
 from theory.cycle import cycle_of
 from theory.precision import finite_array, guarded
 from theory.prediction import resolutions
-from theory.prepared import Prepared, prepare
+from theory.prepared import PreparedMushroom, prepare
 from theory.volumes import volumes_of
 
 Floats = NDArray[np.float64]
@@ -186,13 +186,13 @@ def tree(scene: Scene) -> Node:
 
 
 @guarded
-def solve_cycle(mushroom: Prepared) -> SolvedCycle:
+def solve_cycle(mushroom: PreparedMushroom) -> SolvedCycle:
     """Solve a cycle as `tree` does, or find it as it was solved before."""
     return _solved(mushroom)
 
 
 @lru_cache(maxsize=32)
-def _solved(mushroom: Prepared) -> SolvedCycle:
+def _solved(mushroom: PreparedMushroom) -> SolvedCycle:
     # Every curve and histogram of a scene asks for its tree again. Its arrays are shared, hence read only.
     cycle = cycle_of(mushroom, DIGITS)
     found = next(resolutions(mushroom, cycle))
@@ -347,7 +347,7 @@ def chaotic_zone(scene: Scene, times: ArrayLike) -> ChaoticZone:
     return zone_of(prepare(scene), t)
 
 
-def zone_of(mushroom: Prepared, t: Floats) -> ChaoticZone:
+def zone_of(mushroom: PreparedMushroom, t: Floats) -> ChaoticZone:
     """Return the `chaotic_zone` of a mushroom that is prepared, at times (n,)."""
     root, start, period = solve_cycle(mushroom)
     n_before = np.zeros_like(t)

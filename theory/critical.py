@@ -17,7 +17,7 @@ from scene import exact
 from scene.exact import half_angle, leg_intervals, leg_polynomial
 from scene.laws import Law
 from scene.pieces import exact as number
-from theory.prepared import NotCovered, Prepared
+from theory.prepared import NotCovered, PreparedMushroom
 
 MANY_BITS = 512  # beyond which Newton's method begins with fewer
 
@@ -37,7 +37,7 @@ class Span(NamedTuple):
     critical: tuple[Any, ...]
 
 
-def spans(ctx: Any, mushroom: Prepared) -> list[Span]:
+def spans(ctx: Any, mushroom: PreparedMushroom) -> list[Span]:
     """Cut one period into spans, in order of time; an empty list when nu never changes.
 
     Args:
@@ -45,7 +45,7 @@ def spans(ctx: Any, mushroom: Prepared) -> list[Span]:
         mushroom: as it is prepared.
 
     Raises:
-        NotCovered: one factor of nu is polynomials of time, the other a sum of waves.
+        NotCovered: a factor is polynomials of time and the other waves; or nu' is beyond a parabola.
 
     Source: eq:dnu.
     """
@@ -101,6 +101,10 @@ def _polynomial_spans(ctx: Any, jointed: Sequence[Law], width: Law, radius: Law)
             exact.multiply(exact.derivative(w), r),
             exact.scale(exact.multiply(w, exact.derivative(r)), Fraction(-1)),
         )
+        if len(slope) > 3:
+            raise NotCovered(
+                "nu = w / r of polynomials beyond parabolas: give the mouth by `nu`, a cubic at most"
+            )
         begin, last = number(ctx, a), (number(ctx, b), _multiplicity_at(slope, b - a))
         turns = [(begin + x, m) for x, m in _roots(ctx, slope, Fraction(0), b - a)]
         times = [(begin, _multiplicity_at(slope, Fraction(0))), *turns, last]

@@ -34,7 +34,7 @@ from scene.refusal import BadInput, check_count
 from scene.tables import Scene
 from theory.critical import Span, solve_rising, spans
 from theory.precision import MAX_DIGITS, Binary, guarded, one_of, settle
-from theory.prepared import NotCovered, Prepared, prepare
+from theory.prepared import NotCovered, PreparedMushroom, prepare
 
 # Digits beyond those asked. A loop that binary64 cannot tell from a trivial one has g - 1 ~ 1e-16 and
 # m1 ~ 1e-32; with 40 more digits such an m1 still differs from zero.
@@ -242,7 +242,7 @@ class NuWell(NamedTuple):
 
 
 @guarded
-def cycle_of(mushroom: Prepared, digits: int) -> Cycle:
+def cycle_of(mushroom: PreparedMushroom, digits: int) -> Cycle:
     """Return `Cycle.of` a mushroom that is prepared."""
     ctx = Decimals(digits + GUARD)
     settle(ctx)
@@ -256,7 +256,7 @@ def cycle_of(mushroom: Prepared, digits: int) -> Cycle:
     return Cycle(ctx, digits, run[0].upper, length, max(levels), min(levels), found)
 
 
-def stretches(ctx: Any, mushroom: Prepared) -> list[MonotoneStretch]:
+def stretches(ctx: Any, mushroom: PreparedMushroom) -> list[MonotoneStretch]:
     """Return one period's stretches in order of time, from a highest maximum of nu.
 
     The list is empty if nu is constant.
@@ -326,7 +326,7 @@ def _next_period(ctx: Any, shared: Period | None, span: Span) -> Span:
     )
 
 
-def _stretch(ctx: Any, mushroom: Prepared, span: Span) -> MonotoneStretch:
+def _stretch(ctx: Any, mushroom: PreparedMushroom, span: Span) -> MonotoneStretch:
     """Return the stretch of a span, or of a plateau what looks like one."""
     if not span.start < span.end:
         raise NotCovered(f"the mouth turns twice in so short a time that {ctx.dps} digits do not tell when")
@@ -378,7 +378,7 @@ class MovingMushroom:
         binary: that in which they are worked out.
     """
 
-    def __init__(self, ctx: Any, mushroom: Prepared, time: Fraction) -> None:
+    def __init__(self, ctx: Any, mushroom: PreparedMushroom, time: Fraction) -> None:
         self.ctx, self.binary = ctx, Binary(ctx)
         self._made_of = ctx, mushroom, time
         pieces = {name: law.piece_at(time) for name, law in mushroom.laws.items()}

@@ -30,7 +30,7 @@ from theory.adiabatic import Captures, NotConverged, captures, refined, silent
 from theory.chebyshev import logarithm
 from theory.cycle import GUARD, Cycle, cycle_of
 from theory.precision import MAX_DIGITS, MAX_ORDER, guarded, one_of
-from theory.prepared import Prepared, as_mushroom, prepare
+from theory.prepared import PreparedMushroom, as_mushroom, prepare
 
 MOST_RESOLUTIONS = 4
 # Decimals beyond those asked to which parts are halved anew, by resolution. Figures may be small beside 1:
@@ -230,7 +230,7 @@ def converged(
 
 
 def resolutions(
-    mushroom: Prepared, cycle: Cycle, progress: Callable[[int, float], None] | None = None
+    mushroom: PreparedMushroom, cycle: Cycle, progress: Callable[[int, float], None] | None = None
 ) -> Iterator[Captures]:
     """Yield a cycle's captures, resolved more and more finely.
 

@@ -29,7 +29,7 @@ class NotCovered(BadInput):
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class PreparedMushroom:
     """A mushroom and its motion.
 
     Attributes:
@@ -61,7 +61,7 @@ class Prepared:
             return NearUnits(self, 0, 0)  # solved already, maybe
         return NearUnits(prepare(scaled(self.given, -length, -time)), length, time)
 
-    def __reduce__(self) -> tuple[Callable[[Scene], Prepared], tuple[Any, ...]]:
+    def __reduce__(self) -> tuple[Callable[[Scene], PreparedMushroom], tuple[Any, ...]]:
         """Tell pickle and copy to prepare the scene again."""
         return prepare, (self.given,)
 
@@ -69,12 +69,12 @@ class Prepared:
 class NearUnits(NamedTuple):
     """A mushroom in other units, and these as powers of two of its own."""
 
-    mushroom: Prepared
+    mushroom: PreparedMushroom
     length: int
     time: int
 
 
-def prepare(scene: Scene) -> Prepared:
+def prepare(scene: Scene) -> PreparedMushroom:
     """Prepare a scene, or find it as it was prepared before.
 
     Raises:
@@ -93,10 +93,10 @@ def as_mushroom(scene: Scene) -> Mushroom:
 
 
 @lru_cache(maxsize=256)
-def _prepared(scene: Mushroom) -> Prepared:
+def _prepared(scene: Mushroom) -> PreparedMushroom:
     laws = scene.laws
     slope = laws["slope"]
-    return Prepared(
+    return PreparedMushroom(
         given=scene,
         laws=laws,
         mouth=mouth_factors(scene),

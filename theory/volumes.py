@@ -18,7 +18,7 @@ from scene.precision import reduce_record
 from scene.refusal import BadInput, check_number, shown
 from scene.tables import Scene
 from theory.precision import check_real, in_system
-from theory.prepared import Prepared, prepare
+from theory.prepared import PreparedMushroom, prepare
 
 WIDE = 0.75  # nu from which the island's share is summed as a series
 
@@ -141,7 +141,7 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
     return volumes_of(ctx, mushroom, np.asarray(t) if ctx is np else t)
 
 
-def volumes_of(ctx: Any, mushroom: Prepared, t: Any) -> Volumes:
+def volumes_of(ctx: Any, mushroom: PreparedMushroom, t: Any) -> Volumes:
     """Return `volumes_at` of a mushroom that is prepared, at a time that is a number of ctx."""
     r, h, slope = (mushroom.laws[name].value(ctx, t) for name in ("r", "h", "slope"))
     width, radius = mushroom.mouth

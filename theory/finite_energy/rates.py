@@ -29,7 +29,7 @@ from scene.mouth import start_time
 from scene.tables import Scene
 from scene.transforms import backwards
 from theory.branches import Floats, solve_cycle, zone_of
-from theory.prepared import NotCovered, Prepared, prepare
+from theory.prepared import NotCovered, PreparedMushroom, prepare
 from theory.volumes import delta_slope, volumes_of
 
 FILE = Path(__file__).with_name("frozen_rates.json")
@@ -97,7 +97,7 @@ def kick_rates(scene: Scene, times: Floats | float) -> Floats:
     return kick_rates_of(prepare(scene), np.asarray(times, dtype=np.float64))
 
 
-def kick_rates_of(mushroom: Prepared, times: Floats) -> Floats:
+def kick_rates_of(mushroom: PreparedMushroom, times: Floats) -> Floats:
     """Return the `kick_rates` of a mushroom that is prepared."""
     now = table_at(fp, mushroom.given, times)
     volumes = volumes_of(np, mushroom, times)
@@ -122,13 +122,13 @@ def frozen_rates(scene: Scene) -> tuple[Rates, bool]:
 class MeasuredRates(NamedTuple):
     """A mushroom that was measured, its rates, and whether it is the reverse of what is sought."""
 
-    mushroom: Prepared
+    mushroom: PreparedMushroom
     rates: Rates
     is_reverse: bool
 
 
 @lru_cache(maxsize=256)
-def find_rates(mushroom: Prepared) -> MeasuredRates:
+def find_rates(mushroom: PreparedMushroom) -> MeasuredRates:
     """Find the rates of a cycle or of its reverse.
 
     Raises:
@@ -189,7 +189,7 @@ def _between(columns: Floats, phase: Floats, spans: Floats) -> Floats:
     return found
 
 
-def _spans(measured: Prepared) -> Floats:
+def _spans(measured: PreparedMushroom) -> Floats:
     """Return the phases, in (0, 1), at which a law stops being analytic and its walls rest."""
     length = measured.period
     laws = measured.laws.values()
@@ -197,7 +197,7 @@ def _spans(measured: Prepared) -> Floats:
     return np.array(sorted(knots - {0.0}))
 
 
-def _is_one_cycle(measured: Prepared, sought: Prepared) -> bool:
+def _is_one_cycle(measured: PreparedMushroom, sought: PreparedMushroom) -> bool:
     """Tell whether two scenes move alike, however their laws are written.
 
     Values and rates at PHASES tell apart all Fourier laws of up to 63 harmonics, more than a product of two
@@ -224,7 +224,7 @@ def _is_one_cycle(measured: Prepared, sought: Prepared) -> bool:
 
 
 @lru_cache(maxsize=1)
-def _table() -> dict[str, tuple[Prepared, Rates]]:
+def _table() -> dict[str, tuple[PreparedMushroom, Rates]]:
     data = json.loads(FILE.read_text("utf-8"))
     found = {}
     for name, entry in data["scenes"].items():
@@ -256,7 +256,7 @@ class CycleCoefficients(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def cycle_coefficients(mushroom: Prepared) -> CycleCoefficients:
+def cycle_coefficients(mushroom: PreparedMushroom) -> CycleCoefficients:
     """Follow a cycle whose frozen rates are known.
 
     Raises:
@@ -282,7 +282,7 @@ def cycle_coefficients(mushroom: Prepared) -> CycleCoefficients:
     return CycleCoefficients(start, step, log_energy, hazard, nu_rate < 0, shear, crossing, rates)
 
 
-def _clock_start(mushroom: Prepared) -> float:
+def _clock_start(mushroom: PreparedMushroom) -> float:
     """Return when an ensemble's cycle begins: at a bang-bang law's first knot, else at 0; or cycles later.
 
     Raises:

@@ -23,7 +23,7 @@ from theory.adiabatic import NotConverged
 from theory.branches import Floats, solve_cycle, zone_of
 from theory.finite_energy.rates import kick_rates_of
 from theory.precision import finite_array
-from theory.prepared import NotCovered, Prepared, prepare
+from theory.prepared import NotCovered, PreparedMushroom, prepare
 from theory.volumes import volumes_of
 
 # Panels of a cycle at first, cut at the laws' knots too; each is halved until its halves agree with it.
@@ -89,14 +89,14 @@ def upright_rate(scene: Scene, times: ArrayLike) -> Floats:
     return _in_own_units(_growth(near, np.ldexp(at, -time))[0], length - 2 * time)
 
 
-def _prepare_upright(scene: Scene) -> Prepared:
+def _prepare_upright(scene: Scene) -> PreparedMushroom:
     mushroom = prepare(scene)
     if not mushroom.is_upright:
         raise NotCovered(TILTED)
     return mushroom
 
 
-def _growth(mushroom: Prepared, at: Floats) -> Floats:
+def _growth(mushroom: PreparedMushroom, at: Floats) -> Floats:
     """Return `upright_rate` at times (T,), and what rounding may make of a rate of 0; shape (2, T)."""
     now = table_at(fp, mushroom.given, at)
     volumes = volumes_of(np, mushroom, at)
@@ -153,7 +153,7 @@ def _in_own_units(found: Floats, exponent: int) -> Floats:
     return own
 
 
-def _edges(mushroom: Prepared, start: float) -> Floats:
+def _edges(mushroom: PreparedMushroom, start: float) -> Floats:
     """Return times from start to the cycle's end, rising, between which every law is one piece."""
     length = mushroom.period
     inside = start + (np.array(mushroom.breakpoints) - start) % length

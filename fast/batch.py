@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from fast.ensemble import only_stop
 from fast.kernel import records, rows
+from fast.kernel.batch import fill_careful, fill_lane, residual, step_lanes
 from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, unfilled_ends
-from fast.kernel.starts import fill_careful, fill_lane, residual, step_lanes
 from fast.kernel.worker import DISK, GENERAL, careful_at, new_worker
 from fast.paths import FineTrajectory, as_trajectory, fill_fine_path
 from fast.pieces import laws_in_lanes

@@ -1,6 +1,7 @@
 """How a command ends: the exit code and the line.
 
-Bad input of any kind is one line on stderr and exit code 2.
+Bad input of any kind is one line on stderr and exit code 2. What `mushrooms check` finds has its
+code from `conformance.suite.result`.
 """
 
 import codecs

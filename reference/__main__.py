@@ -24,13 +24,16 @@ def step(scene: Scene, state: State, t_end: float) -> Outcome:
 
 
 def follow(scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
-    """Return the proved collisions of a trajectory, rounded; the last entry may be another outcome."""
+    """Return the proved collisions of a trajectory, rounded.
+
+    The last entry may be another outcome.
+    """
     path = reference.trajectory(scene, state, n_collisions, t_end)
     return [rounded(outcome) for outcome in path.outcomes]
 
 
 def clock(scene: Scene, state: State, n_collisions: int, repeat: int) -> tuple[list[int], Outcome]:
-    """Return the nanoseconds that a proved trajectory took, `repeat` times over, and its last outcome."""
+    """Return the nanoseconds of each of `repeat` proofs of a trajectory, and its last outcome."""
     ns = []
     for _ in range(repeat):
         begin = time.perf_counter_ns()

@@ -76,7 +76,8 @@ class Trajectory(NamedTuple):
 
     Attributes:
         steps: the collisions, each enclosed.
-        outcome: None if all collisions were found; else the outcome that ended the path before that.
+        outcome: None if all collisions were found; else the outcome that ended the path before
+            that.
         digits: the working decimals that were needed.
         jacobian: d(t, x, y, vx, vy) after the last collision / d(initial state), if asked for.
     """

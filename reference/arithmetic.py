@@ -18,8 +18,9 @@ from scene.precision import CONSTANTS, ExactMpf, intervals, reduce_record
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
 BITS_PER_DIGIT = 3.3219280948873626
-# Work that one step may take, in the unit of `WorkLimit`. Measured: at most 6,400 for a vector of the corpus
-# at 50 digits, 4,400 for a plain step at 10,000 digits; 0.03 to 0.2 ms a unit on one idle core.
+# Work that one step may take, in the unit of `WorkLimit`. Measured: at most 6,400 for a vector of
+# the corpus at 50 digits, 4,400 for a plain step at 10,000 digits; 0.03 to 0.2 ms a unit on one
+# idle core.
 MAX_WORK = 50_000.0
 LONG_NUMBER = 1024  # bits; arithmetic with so long a number takes twice as long as with a short one
 
@@ -68,7 +69,7 @@ class Enclosure(NamedTuple):
         return float(self.centre())
 
     def __repr__(self) -> str:
-        """Return the centre with its known decimals, and the greatest distance of the true number from it."""
+        """Return the centre with its known decimals, and how far the true number may be from it."""
         centre = self.centre()
         half = self.extent() / 2
         if not half and Fraction(float(self)) == centre:
@@ -201,7 +202,7 @@ class Arithmetic:
         return self.context.make_mpf((lo, hi))
 
     def inflated(self, x: Interval) -> Interval:
-        """Return a slightly wider interval, which another arithmetic can prove to contain this one."""
+        """Return a wider interval, which another arithmetic can prove to contain this one."""
         margin = self.upper(x.delta) * self.power_of_two(-6)
         return self.hull(self.lower(x - margin), self.upper(x + margin))
 

@@ -1,10 +1,10 @@
 """One flight from a state to its first collision, at one working precision.
 
-At y = 0 the straight flight passes from one part of the table to the other. On each part the walls that
-bound it are searched from the left (`reference.isolation`). All quantities are enclosures, except the
-instant from which flight times are counted, so a trajectory can chain flights. `Undecidable` is raised if
-the precision does not decide. Only `reference.rational` proves equalities. docs/proof.md says what each
-answer claims, and why.
+At y = 0 the straight flight passes from one part of the table to the other. On each part the walls
+that bound it are searched from the left (`reference.isolation`). All quantities are enclosures,
+except the instant from which flight times are counted, so a trajectory can chain flights.
+`Undecidable` is raised if the precision does not decide. Only `reference.rational` proves
+equalities. docs/proof.md says what each answer claims, and why.
 """
 
 import itertools
@@ -77,7 +77,7 @@ class Course:
         return found if found is not None or limit is None else self._beyond_crossing(limit)
 
     def hit_after(self, wall: Wall, start: Interval) -> Interval | None:
-        """Find when the straight flight would meet a wall after `start`, were nothing in its way."""
+        """Find when the flight would meet a wall after `start`, were nothing in its way."""
         if wall == "base":
             crossing = self._crossing()
             return crossing if crossing is not None and is_below(start, crossing) else None
@@ -165,7 +165,7 @@ class Course:
     def _first_hit(
         self, walls: tuple[Wall, ...], start: Interval, limit: Interval | None
     ) -> Hit | Undefined | None:
-        """Find which of some walls is met first, before y = 0 is crossed (`limit`) or the horizon."""
+        """Find which of some walls is met first, before y = 0 (`limit`) or the horizon."""
         hits = self._hits(walls, start, limit)
         if not hits:
             farthest = self._escape_time()
@@ -180,35 +180,45 @@ class Course:
         return self._tied(hits, limit)
 
     def _hits(self, walls: tuple[Wall, ...], start: Interval, limit: Interval | None) -> list[Hit]:
-        """Find the walls that may be met first; each later one in the list not after those before it.
+        """Find the walls that may be met first.
 
-        A wall met exactly at the horizon is not met before it. A root whose interval contains the end of a
-        search is no answer yet: a wall searched before may be met beyond this end, within the interval.
+        No hit in the list is after one that stands before it.
+
+        A wall met exactly at the horizon is not met before it. A root whose interval contains the
+        end of a search is no answer yet: a wall searched before may be met beyond this end, within
+        the interval.
         """
         hits: list[Hit] = []
-        postponed: list[Wall]
         for stop in self._stops(start, self.horizon if limit is None else limit):
-            until = stop
-            hits = []
-            postponed = []
-            for wall in itertools.chain(walls, postponed):
-                try:
-                    hit = self._hit(wall, start, until, self._searches)
-                except Undecidable as question:
-                    # An undecided wall may be met after another one. Each wall is postponed once.
-                    if isinstance(question, Exhausted) or wall in postponed:
-                        raise
-                    postponed.append(wall)
-                    continue
-                if hit is not None and not self._is_at_horizon(hit):
-                    hits.append(hit)
-                    until = hit.time
-            if hits and is_below(until, stop):
+            hits = self._hits_before(stop, walls, start)
+            if hits and is_below(hits[-1].time, stop):
                 break
         return hits
 
+    def _hits_before(self, stop: Interval, walls: tuple[Wall, ...], start: Interval) -> list[Hit]:
+        """Find the walls that may be met first before one end of a search."""
+        until = stop
+        hits: list[Hit] = []
+        postponed: list[Wall] = []
+        for wall in itertools.chain(walls, postponed):
+            try:
+                hit = self._hit(wall, start, until, self._searches)
+            except Undecidable as question:
+                # An undecided wall may be met after another one. Each wall is postponed once.
+                if isinstance(question, Exhausted) or wall in postponed:
+                    raise
+                postponed.append(wall)
+                continue
+            if hit is not None and not self._is_at_horizon(hit):
+                hits.append(hit)
+                until = hit.time
+        return hits
+
     def _stops(self, start: Interval, until: Interval) -> Iterator[Interval]:
-        """Yield later and later ends of a search, first after one period: an early hit stays cheap."""
+        """Yield later and later ends of a search, first after one period.
+
+        An early hit stays cheap.
+        """
         upper = self.arithmetic.upper
         farthest = self._escape_time()
         last = upper(until)
@@ -245,7 +255,7 @@ class Course:
         raise Undecidable("two walls are met together, as far as this precision shows")
 
     def _rational_times(self, state: State) -> list[Fraction]:
-        """List the flight times, before the horizon, at which straight walls that stand still are met."""
+        """List the flight times at which straight walls at rest are met before the horizon."""
         times = [rational.crossing_time(state)]
         times += [rational.straight_time(self.table, state, wall) for wall in SIDES]
         return [
@@ -279,7 +289,8 @@ class Course:
     ) -> Hit | None:
         """Find the first root of one wall's function, if it may come before the end of `until`.
 
-        A search continues where it stopped, because f > 0 is proved there, unless it has found its root.
+        A search continues where it stopped, because f > 0 is proved there, unless it has found its
+        root.
         """
         stop = self.arithmetic.upper(until)
         if wall not in searches:
@@ -298,7 +309,9 @@ class Course:
         return Hit(wall, root.time, root.slope)
 
     def _end_beyond(self, search: Isolator, stop: Interval, length: Interval) -> Interval:
-        """Return where a search ends: a little later than asked for, so that a root at the end lies inside.
+        """Return where a search ends.
+
+        A little later than asked for, so that a root at the end lies inside.
 
         f must have a sign there, because a root may lie at that later end too.
         """

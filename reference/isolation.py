@@ -1,15 +1,16 @@
 """The first downward root of a wall function, isolated left first.
 
-Sub-intervals cover the flight from the left. On each, f > 0 is proved, given f >= 0 at its left end:
+Sub-intervals cover the flight from the left. On each, f > 0 is proved, given f >= 0 at its left
+end:
     direct           f(I) > 0;
     centred          f(m) + f'(m)(I - m) + f''(I)(I - m)^2 / 2 > 0 with m inside I;
     increasing       f' > 0 on it;
     decreasing       f' < 0 on it, and f > 0 at its right end;
     concave          f'' <= 0 on it, and f > 0 at its right end;
     flat start       f'' > 0 on it, and f = f' = 0 exactly at its left end, the start;
-    never reached    the wall does not meet, in a whole period, particles at rest at the two ends of the
-                     path on it. For fixed laws f is concave along a flight, so f > 0 between these two
-                     positions at every phase.
+    never reached    the wall does not meet, in a whole period, particles at rest at the two ends of
+                     the path on it. For fixed laws f is concave along a flight, so f > 0 between
+                     these two positions at every phase.
 A root is accepted only on an interval with f' < 0 throughout, f > 0 at its left end and f < 0
 at its right one. If none of this decides, the interval is halved, at last refused (`Undecidable`).
 
@@ -18,8 +19,8 @@ enclosed with all its one-sided values. Each of these arguments, interval Newton
 uniqueness of the root need only that, so an interval may contain knots.
 
 On the wall being left, f stands for f - f(0), and f = 0 where the flight begins. That moment may
-be known only within `begin`. On a sub-interval that does not begin after it, f must then increase, or
-be concave with all of `begin` inside.
+be known only within `begin`. On a sub-interval that does not begin after it, f must then increase,
+or be concave with all of `begin` inside.
 """
 
 from collections.abc import Callable
@@ -60,10 +61,12 @@ class Isolator:
         arithmetic: the working precision.
         jet: f, f', f'' over an interval of flight time.
         begin: encloses the flight time at which the flight begins.
-        residual: f(0) when the particle leaves this wall (the root s = 0 is divided out), else None.
+        residual: f(0) when the particle leaves this wall (the root s = 0 is divided out), else
+            None.
         is_flat: f(0) = f'(0) = 0 exactly, so that only f'' > 0 can prove the start.
         timeline: gives the knots of the laws, where intervals are best cut.
-        is_never_met: tells whether the wall never comes to where the flight is at a time; None: not known.
+        is_never_met: tells whether the wall never comes to where the flight is at a time; None: not
+            known.
         reached: f > 0 is proved up to here, a thin interval; None before the search begins.
         n_excluded: sub-intervals on which f > 0 has been proved.
         root: the first root, once it has been found.
@@ -96,7 +99,7 @@ class Isolator:
         return self.root
 
     def first_fall(self, start: Interval, end: Interval) -> tuple[Interval, Interval] | None:
-        """Find where f > 0 first falls below 0, by f' < 0 throughout, or prove that there is no root.
+        """Find where f > 0 first falls below 0, by f' < 0 throughout, or prove that it does not.
 
         Args:
             start: thin interval; that f > 0 there, or that the flight begins there on this wall and
@@ -104,7 +107,8 @@ class Isolator:
             end: thin interval.
 
         Returns:
-            The ends of a sub-interval of (start, end] that holds one root and no earlier one; None for none.
+            The ends of a sub-interval of (start, end] that holds one root and no earlier one; None
+            for none.
 
         Raises:
             Undecidable: when this precision cannot tell.
@@ -134,7 +138,10 @@ class Isolator:
         return None
 
     def _sharpened(self, a: Interval, b: Interval, whole: Interval) -> Jet:
-        """Evaluate f and its derivatives over an interval; f' from its ends where it is monotonic."""
+        """Evaluate f and its derivatives over an interval.
+
+        f' from its ends where it is monotonic.
+        """
         jet = self.jet(whole)
         if sign(jet.d1) != 0 or sign(jet.d2) == 0:
             return jet
@@ -147,8 +154,9 @@ class Isolator:
     def _expanded(self, whole: Interval, jet: Jet) -> Jet:
         """Enclose f and f' again, by Taylor's theorem: f' is Lipschitz, also across knots.
 
-        Near a flat minimum of a law its waves cancel. Evaluated directly, the error of f is then proportional
-        to the length of the interval; this way it is proportional to the cube of the length.
+        Near a flat minimum of a law its waves cancel. Evaluated directly, the error of f is then
+        proportional to the length of the interval; this way it is proportional to the cube of the
+        length.
         """
         arithmetic = self.arithmetic
         middle = self.arithmetic.middle(whole)
@@ -170,8 +178,8 @@ class Isolator:
     def _require_rise(self, a: Interval, b: Interval, cut: Interval) -> None:
         """Refuse to cut an interval if f does not increase near the start of the flight.
 
-        On a part that neither contains all of `begin` nor lies after it, f must increase. If f' > 0 is not
-        proved at one of its points, cutting would never end there.
+        On a part that neither contains all of `begin` nor lies after it, f must increase. If f' > 0
+        is not proved at one of its points, cutting would never end there.
         """
         latest = self.arithmetic.upper(self.begin)
         holds_all = not is_below(self.arithmetic.lower(self.begin), a) and is_below(latest, cut)
@@ -200,7 +208,7 @@ class Isolator:
         )
 
     def _is_never_reached(self, a: Interval, b: Interval) -> bool:
-        """Tell whether the wall never comes, over at least a period, to where the flight is at a nor at b."""
+        """Tell whether the wall never comes, in a period, to where the flight is at a or b."""
         ask = self.is_never_met
         length = exact_ends(b)[0] - exact_ends(a)[0]
         if ask is None or self._may_begin(a) or not self.timeline.is_whole(length):
@@ -226,8 +234,8 @@ class Isolator:
         """Enclose where a convex f is least, by interval Newton on f', until f has a sign there.
 
         Returns:
-            The ends of a wider enclosure, so that f clearly falls left of it and rises right of it; those of
-            `whole` when f may be least at an end.
+            The ends of a wider enclosure, so that f clearly falls left of it and rises right of it;
+            those of `whole` when f may be least at an end.
         """
         where = whole
         for _ in range(MAX_NEWTON):
@@ -264,12 +272,14 @@ class Isolator:
         half_way = self.arithmetic.middle(self.arithmetic.hull(a, b))
         earlier = self.arithmetic.middle(self.arithmetic.hull(a, half_way))
         later = self.arithmetic.middle(self.arithmetic.hull(half_way, b))
-        # Should f vanish half way, which is a short number and may lie aside: the wider part is cut first.
+        # Should f vanish half way, which is a short number and may lie aside: the wider part is cut
+        # first.
         is_left_wider = is_below(b - half_way, half_way - a)
         aside = (earlier, later) if is_left_wider else (later, earlier)
         for point in (self._knot(a, b), half_way, *aside):
             is_inside = point is not None and is_below(a, point) and is_below(point, b)
-            # While the flight may still begin, on the wall, no sign is asked for: f rises or is refused.
+            # While the flight may still begin, on the wall, no sign is asked for: f rises or is
+            # refused.
             if is_inside and (self._may_begin(point) or sign(self.value(point)) != 0):
                 return point
         raise Undecidable("f has no sign where the interval is split")
@@ -294,9 +304,12 @@ class Isolator:
             time = smaller
 
     def _cut(self, time: Interval, middle: Interval, f: Interval) -> Interval | None:
-        """Return the part of an enclosure that holds the root, by the sign of f inside; None without one.
+        """Return the part of an enclosure that holds the root, by the sign of f inside.
 
-        The root may lie half way, at a knot say, however wide the enclosure is; then not at a quarter.
+        None without one.
+
+        The root may lie half way, at a knot say, however wide the enclosure is; then not at a
+        quarter.
         """
         lower = self.arithmetic.lower(time)
         upper = self.arithmetic.upper(time)
@@ -308,7 +321,7 @@ class Isolator:
         return self.arithmetic.hull(*((middle, upper) if sign(f) > 0 else (lower, middle)))
 
     def _margin(self, time: Interval) -> Interval:
-        """Return how much wider than its width, and than its rounding, an enclosed time is taken."""
+        """Return how much wider than itself, and its rounding, an enclosed time is taken."""
         least = self.arithmetic.upper(time) * self.arithmetic.power_of_two(8 - self.arithmetic.prec)
         return self.arithmetic.upper(time.delta + least)
 

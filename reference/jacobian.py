@@ -3,12 +3,13 @@
 With event point q = (x + vx s, y + vy s, t + s) and D = f'(s), the root's condition gives
 ds = -(f_q . dq at fixed s) / D, and the bounce v' = v - 2 D N / |N|^2 with N = (f_x, f_y) is
 differentiated through the second partials of f. Where the wall being left is met again, the
-equation is f(s) = f(0), and f(0) moves with the state too. Along a path that stays so: the residual of a
-wall met again and again is that of the first start, but each flight begins where f is just this, so that
-f at its own begin moves as much, whatever start moves it. After another wall it is 0, and moves not at all.
+equation is f(s) = f(0), and f(0) moves with the state too. Along a path that stays so: the residual
+of a wall met again and again is that of the first start, but each flight begins where f is just
+this, so that f at its own begin moves as much, whatever start moves it. After another wall it is 0,
+and moves not at all.
 
-The second derivatives jump at a knot. Rounding may put a hit on either side of one that is as near as
-binary64 resolves the time of the hit, so both sides' derivatives are enclosed there.
+The second derivatives jump at a knot. Rounding may put a hit on either side of one that is as near
+as binary64 resolves the time of the hit, so both sides' derivatives are enclosed there.
 """
 
 from fractions import Fraction

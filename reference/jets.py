@@ -1,4 +1,7 @@
-"""A function with its first two derivatives: enclosures over an interval of time, or exact numbers."""
+"""A function with its first two derivatives.
+
+Enclosures over an interval of time, or exact numbers.
+"""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple

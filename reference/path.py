@@ -1,12 +1,15 @@
-"""Ground truth of one step and of many: every collision and state enclosed, and proved at any precision.
+"""Ground truth of one step and of many.
 
-`next_collision` answers one step; `trajectory` takes all steps at one working precision. Both begin again
-with twice the digits until the answer is proved or a cap is reached; then they say `Undecided`. What is
-claimed, and why it follows: docs/proof.md.
+Every collision and state enclosed, and proved at any precision.
+
+`next_collision` answers one step; `trajectory` takes all steps at one working precision. Both begin
+again with twice the digits until the answer is proved or a cap is reached; then they say
+`Undecided`. What is claimed, and why it follows: docs/proof.md.
 
 A collision's time is enclosed, so the state after it is carried along the new line of flight to an
-exact instant within that enclosure. There place and velocity are boxes and the time is a number; the
-flight itself begins a little before or after, at an enclosed flight time (`EnclosedFlight.begin`).
+exact instant within that enclosure. There place and velocity are boxes and the time is a number;
+the flight itself begins a little before or after, at an enclosed flight time
+(`EnclosedFlight.begin`).
 """
 
 from __future__ import annotations
@@ -57,15 +60,15 @@ def next_collision(
     Args:
         scene: table and laws of motion; numbers are exact binary64.
         state: position (x, y) [length], velocity (vx, vy) [length/time], wall being left or None.
-        t_end: horizon [time], t_end >= state.t; a wall met at t_end exactly is not met before it. A state
-            at t_end has arrived: the outcome is Horizon, even if no flight could begin there.
+        t_end: horizon [time], t_end >= state.t; a wall met at t_end exactly is not met before it. A
+            state at t_end has arrived: the outcome is Horizon, even if no flight could begin there.
         digits: correct decimals wanted, 1 to 10,000; guard digits are added inside.
         is_differentiated: whether to return the Jacobian of the step.
         is_measured: whether to return the margins of the collision.
 
     Returns:
-        Collision, with its time enclosed to a relative 10**-digits; Horizon; Undefined; Undecided, also if
-        the work for one step is used up; or Rejected for a state outside this table.
+        Collision, with its time enclosed to a relative 10**-digits; Horizon; Undefined; Undecided,
+        also if the work for one step is used up; or Rejected for a state outside this table.
 
     Raises:
         BadInput: `scene` is not a scene or `digits` out of range, naming field, value and bound.
@@ -104,12 +107,12 @@ def trajectory(
         scene: table and laws of motion.
         state: the exact start.
         n_collisions: how many collisions to follow, 0 to 1,000,000.
-        t_end: horizon [time], None for none. A particle that never meets a wall then ends with a Horizon
-            at the flight time 2^1000.
-        digits: decimals wanted of the last state, relative to the size of its vectors; 1 to 10,000. A
-            position that may be 0 has this many digits relative to the length of the last flight.
-        working: decimals to work with. The path ends with Undecided if they do not decide the next step, for
-            any `digits`. By default they are doubled until they suffice.
+        t_end: horizon [time], None for none. A particle that never meets a wall then ends with a
+            Horizon at the flight time 2^1000.
+        digits: decimals wanted of the last state, relative to the size of its vectors; 1 to 10,000.
+            A position that may be 0 has this many digits relative to the length of the last flight.
+        working: decimals to work with. The path ends with Undecided if they do not decide the next
+            step, for any `digits`. By default they are doubled until they suffice.
         is_differentiated: whether to return the Jacobian of the whole path, and of each step.
 
     Raises:
@@ -137,7 +140,7 @@ def trajectory(
 
 
 def _decided(follow: Callable[[int], Trajectory], working: int, most: int) -> Trajectory:
-    """Follow a particle with enough digits: from `working` on, doubled while they are at most `most`."""
+    """Follow a particle with `working` digits, doubled until they suffice or exceed `most`."""
     while True:
         try:
             return follow(working)
@@ -160,7 +163,8 @@ def checked_digits(scene: Scene, digits: int) -> int:
 def require_digits(found: ProvedCollision, digits: int) -> None:
     """Require the digits asked for: of dt, and of velocity and position relative to their vectors.
 
-    A position that may be 0, as in the middle of a base, has these digits relative to the flight's length.
+    A position that may be 0, as in the middle of a base, has these digits relative to the flight's
+    length.
 
     Raises:
         Undecidable: there are fewer.
@@ -197,7 +201,8 @@ def _follow(
     try:
         course = depart(arithmetic, table, state, None if t_end is None else Fraction(float(t_end)))
         if isinstance(course, Undefined):
-            # Nothing comes next, and nothing need come where no step is asked for, or no time is left.
+            # Nothing comes next, and nothing need come where no step is asked for, or no time is
+            # left.
             end = arrived(arithmetic, state) if t_end == state.t else course
             return Trajectory(steps, end if n_collisions else None, arithmetic.digits)
         outcome, jacobian = _extend(steps, n_collisions, course, is_differentiated, is_measured)
@@ -247,7 +252,7 @@ class Bounce(NamedTuple):
 
 
 def reflect(course: Course, hit: Hit) -> tuple[Interval, Interval]:
-    """Return v - 2 f' grad f / |grad f|^2, the velocity after a hit: v - 2 (v.n - u) n (sec. 3.1)."""
+    """Return the velocity after a hit, v - 2 (v.n - u) n = v - 2 f' grad f / |grad f|^2."""
     f_x, f_y, _ = course.motion.gradient(hit.wall, hit.time)
     factor = 2 * hit.slope / (course.arithmetic.square(f_x) + course.arithmetic.square(f_y))
     return course.flight.vx - factor * f_x, course.flight.vy - factor * f_y

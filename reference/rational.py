@@ -1,12 +1,13 @@
 """Questions that exact arithmetic answers: ties, corners, starts along a wall, paths along y = 0.
 
-Intervals never prove an equality, so `undefined` outcomes rest on this module. Wall functions of a binary64
-state are rational where laws are constant or bang-bang. A Fourier law adds cosines, which are kept as they
-are: cos x at a rational angle x if `omega` is given; at a rational part x of a turn if `period` is given,
-where each derivative brings a factor of pi. A sum is proved to be 0 by these facts:
+Intervals never prove an equality, so `undefined` outcomes rest on this module. Wall functions of a
+binary64 state are rational where laws are constant or bang-bang. A Fourier law adds cosines, which
+are kept as they are: cos x at a rational angle x if `omega` is given; at a rational part x of a
+turn if `period` is given, where each derivative brings a factor of pi. A sum is proved to be 0 by
+these facts:
 
-    cos x and sin x at different rational angles x > 0, and 1, are linearly independent over the rationals
-    (Lindemann and Weierstrass), so each factor is 0;
+    cos x and sin x at different rational angles x > 0, and 1, are linearly independent over the
+    rationals (Lindemann and Weierstrass), so each factor is 0;
     pi is transcendental, so the factor of each power of pi is 0;
     a sum of n-th roots of unity is 0 if the polynomial of their exponents is 0 at a primitive root.
 """
@@ -107,9 +108,9 @@ def _collected(terms: Iterable[tuple[Wave, Fraction]]) -> ExactNumber:
 def _is_zero_sum(factors: dict[Fraction, Fraction]) -> bool:
     """Tell whether a sum of cosines at parts of a turn is known to be 0.
 
-    Its polynomial in an n-th root of unity z is multiplied by 1 - z^(n/q) for each prime q that divides n.
-    These factors are 0 exactly at the roots that are not primitive. So the sum is 0 if and only if the
-    product is 0 modulo z^n - 1.
+    Its polynomial in an n-th root of unity z is multiplied by 1 - z^(n/q) for each prime q that
+    divides n. These factors are 0 exactly at the roots that are not primitive. So the sum is 0 if
+    and only if the product is 0 modulo z^n - 1.
     """
     n = lcm(*(x.denominator for x in factors))
     if n > MAX_ORDER:
@@ -196,7 +197,7 @@ def straight_time(table: PreparedTable, state: State, wall: Wall) -> Fraction | 
 
 
 def is_zero(table: PreparedTable, state: State, wall: Wall, s: Fraction) -> bool:
-    """Tell whether f, less its residual f(0) on the wall being left, is known to vanish exactly at s."""
+    """Tell whether f, less f(0) on the wall being left, is known to vanish exactly at s."""
     f: ExactNumber = wall_jet(table, state, wall, s).f
     if wall == state.wall:
         f += -wall_jet(table, state, wall, Fraction(0)).f

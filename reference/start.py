@@ -16,7 +16,9 @@ from scene.states import ON_WALL
 def depart(
     arithmetic: Arithmetic, table: PreparedTable, state: State, t_end: Fraction | None
 ) -> Course | Undefined:
-    """Judge the starting state; return the flight from it, or why mathematics gives no answer from there.
+    """Judge the starting state.
+
+    Return the flight from it, or why mathematics gives no answer from there.
 
     Args:
         arithmetic: working precision.
@@ -94,7 +96,10 @@ def _check_part(table: PreparedTable, state: State) -> None:
 
 
 def _walls_near(table: PreparedTable, state: State) -> list[Wall]:
-    """List the walls that bound the state's part of the table; in a mushroom the arc ends at the base."""
+    """List the walls that bound the state's part of the table.
+
+    In a mushroom the arc ends at the base.
+    """
     if table.is_cap:
         return ["base", "arc"]
     if table.is_stem:
@@ -174,7 +179,8 @@ def _check_residual(table: PreparedTable, state: State, motion: MovingWalls) -> 
     low, high = exact_ends(gap)
     least, largest = exact_ends(size)
     if wall in ("left", "right"):
-        # If a stem is wider below, its side is as far from the axis as the state, and x rounds accordingly.
+        # If a stem is wider below, its side is as far from the axis as the state, and x rounds
+        # accordingly.
         least, largest = (max(end, abs(Fraction(state.x))) for end in (least, largest))
     if max(-low, high) <= Fraction(ON_WALL) * least:
         return
@@ -186,7 +192,7 @@ def _check_residual(table: PreparedTable, state: State, motion: MovingWalls) -> 
 
 
 def _distance_of(table: PreparedTable, wall: Wall, motion: MovingWalls) -> Interval:
-    """Return r for the arc, w for a side, h for the floor, the larger of r and w for the base, now."""
+    """Return r for the arc and base, w for a side and the base of a stem, h for the floor."""
     zero = motion.arithmetic.zero
     if wall == "floor":
         return motion.law("h", zero).f

@@ -1,18 +1,19 @@
 """The laws of a scene as functions of the time since an exact instant.
 
-An instant is an exact rational, and only the time since it is enclosed. Exact comparisons decide which
-analytic pieces of a law an enclosed time may touch. All of them are evaluated and united. Laws are
-continuously differentiable across their knots, so the union encloses f and f' at every time, and f''
-at every time except knots.
+An instant is an exact rational, and only the time since it is enclosed. Exact comparisons decide
+which analytic pieces of a law an enclosed time may touch. All of them are evaluated and united.
+Laws are continuously differentiable across their knots, so the union encloses f and f' at every
+time, and f'' at every time except knots.
 
-Each wave of a Fourier law is enclosed tightly over an interval of time, but their sum is not, because waves
-may cancel. Near a flat minimum they nearly do. Taylor's theorem is sharper there. About a point m inside an
-interval I
+Each wave of a Fourier law is enclosed tightly over an interval of time, but their sum is not,
+because waves may cancel. Near a flat minimum they nearly do. Taylor's theorem is sharper there.
+About a point m inside an interval I
 
     L(I) lies in  sum over j < ORDER of L_j(m) (I - m)^j / j!  +  [-M, M] (I - m)^ORDER / ORDER!,
 
-where L_j is the derivative of order j, and M = sum (k w)^ORDER (|a_k| + |b_k|) bounds that of order ORDER at
-all times. The derivatives at m are sums over waves too, but of numbers and not of intervals.
+where L_j is the derivative of order j, and M = sum (k w)^ORDER (|a_k| + |b_k|) bounds that of order
+ORDER at all times. The derivatives at m are sums over waves too, but of numbers and not of
+intervals.
 """
 
 from __future__ import annotations
@@ -153,7 +154,7 @@ class Legs:
         return Jet(whole, arithmetic.number(speed) * both, arithmetic.number(bend) * both)
 
     def knots(self, low: Fraction, high: Fraction) -> list[Fraction]:
-        """List the ends of parabolas strictly between two times since the instant, within a period."""
+        """List the ends of parabolas strictly between two times, within a period."""
         found: list[Fraction] = []
         if high - low >= self.period:
             return found
@@ -169,7 +170,10 @@ class Legs:
 
 
 class Waves:
-    """A Fourier law. The phase at the instant is reduced once, so that no digit of it is lost later."""
+    """A Fourier law.
+
+    The phase at the instant is reduced once, so that no digit of it is lost later.
+    """
 
     def __init__(self, arithmetic: Arithmetic, law: Fourier, instant: Fraction) -> None:
         self.arithmetic = arithmetic
@@ -249,7 +253,10 @@ class Waves:
         return found
 
     def _powers(self, away: Interval) -> list[Interval]:
-        """Return u^j / j! for j from 1 to ORDER, and u in an interval; even powers are never below 0."""
+        """Return u^j / j! for j from 1 to ORDER, and u in an interval.
+
+        Even powers are never below 0.
+        """
         half_square = self.arithmetic.square(away) / 2
         powers = [away, half_square]
         for j in range(3, ORDER + 1):

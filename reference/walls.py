@@ -27,8 +27,8 @@ class EnclosedFlight(NamedTuple):
     Attributes:
         instant: absolute time, exactly; flight times s are counted from it [time].
         x, y, vx, vy: enclosures of place and velocity at s = 0, on the line of flight.
-        begin: enclosure of the s at which the flight begins: 0 for a given state; a little before or
-            after 0 for a flight that begins at a collision, whose time is enclosed.
+        begin: enclosure of the s at which the flight begins: 0 for a given state; a little before
+            or after 0 for a flight that begins at a collision, whose time is enclosed.
     """
 
     instant: Fraction
@@ -81,7 +81,10 @@ class MovingWalls:
         self._known: dict[tuple[Wall, Any], Jet] = {}
 
     def at_rest(self, s: Interval) -> MovingWalls:
-        """Return the walls for a particle at rest where the flight is at s. Evaluated laws are shared."""
+        """Return the walls for a particle at rest where the flight is at s.
+
+        Evaluated laws are shared.
+        """
         q = self.flight
         zero = self.arithmetic.zero
         still = copy(self)

@@ -1,7 +1,8 @@
 """What all packages share: laws of motion, tables, states, outcomes.
 
-`laws` and `tables` define scenes, and `validity` proves each one valid when it is made. `load` reads a scene.
-`geometry` describes a table at one instant. `transforms` are changes that leave the physics the same.
+`laws` and `tables` define scenes, and `validity` proves each one valid when it is made. `load`
+reads a scene. `geometry` describes a table at one instant. `transforms` are changes that leave the
+physics the same.
 """
 
 from scene.laws import BangBang, Constant, Fourier, GivenLaw, Law

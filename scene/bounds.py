@@ -36,7 +36,7 @@ def of_legs(knots: Sequence[tuple[float, float]]) -> Bounds:
 
 
 def of_waves(mean: float, harmonics: Harmonics, omega: float, rate: int) -> Bounds:
-    """Bound a mean and one harmonic at least, whose frequency is omega 2^rate to a few roundings."""
+    """Bound a mean and harmonics, whose frequency is omega 2^rate to a few roundings."""
     _, unit = math.frexp(max(max(abs(c), abs(s)) for _, c, s in harmonics))
     terms = [
         (k * omega, math.hypot(math.ldexp(c, -unit), math.ldexp(s, -unit))) for k, c, s in harmonics
@@ -44,7 +44,8 @@ def of_waves(mean: float, harmonics: Harmonics, omega: float, rate: int) -> Boun
     swing = round_up(sum(size for _, size in terms), unit)
     slope = round_up(sum(size * f for f, size in terms), unit + rate)
     curvature = round_up(sum(size * f * f for f, size in terms), unit + 2 * rate)
-    # The sum of two floats errs by half a unit of its last place, and not at all where it is subnormal.
+    # The sum of two floats errs by half a unit of its last place, and not at all where it is
+    # subnormal.
     lowest = mean - swing
     highest = mean + swing
     return Bounds(
@@ -55,8 +56,8 @@ def of_waves(mean: float, harmonics: Harmonics, omega: float, rate: int) -> Boun
 def least_of_waves(mean: float, harmonics: Harmonics) -> float:
     """Bound positive waves from below by samples; return 0 if they do not show a positive bound.
 
-    Between samples at distance d, f is at least the lower neighbour minus max |f''| d^2 / 8. Units are the
-    mean, which is positive, and the phase.
+    Between samples at distance d, f is at least the lower neighbour minus max |f''| d^2 / 8. Units
+    are the mean, which is positive, and the phase.
     """
     waves = [(k, c / mean, s / mean) for k, c, s in harmonics]
     # It bounds what a rounded phase does, too.

@@ -1,6 +1,7 @@
 """Exact algebra: polynomials and numbers of scenes, their roots and signs, in rational arithmetic.
 
-The laws of a scene become polynomials in half angles or in time, and conditions on them are decided exactly.
+The laws of a scene become polynomials in half angles or in time, and conditions on them are decided
+exactly.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ POWERS_OF_I = ((1, 0, -1, 0), (0, 1, 0, -1))  # real and imaginary parts of i^0 
 
 
 def leg_intervals(legs: Sequence[Law]) -> list[tuple[Fraction, Fraction]]:
-    """Cut one period, shared by these laws with knots, at every time at which one is not analytic."""
+    """Cut the period that laws share at each time at which one of them is not analytic."""
     start = legs[0].breakpoints()[0]
     span = Fraction(0)
     cuts = {start}
@@ -29,7 +30,7 @@ def leg_intervals(legs: Sequence[Law]) -> list[tuple[Fraction, Fraction]]:
 
 
 def leg_polynomial(law: float | Law, start: Fraction) -> Polynomial:
-    """Return a law made of polynomials in the variable t - start, right until its next breakpoint."""
+    """Return a law of polynomials in the variable t - start, up to its next breakpoint."""
     piece = law_of(law).piece_at(start)
     assert piece.is_polynomial
     return piece.polynomial(start)
@@ -123,7 +124,7 @@ def _primitive(p: Polynomial) -> Polynomial:
 
 
 def divide(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """Return quotient and remainder of p by q != 0, each up to a positive factor, with coprime integers.
+    """Return quotient and remainder of p by q != 0, each up to a factor, in coprime integers.
 
     All intermediate numbers are whole, because fractions would be reduced at every step.
     """
@@ -146,7 +147,8 @@ def divide(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
 class Sturm:
     """Counts the distinct real roots of a polynomial in intervals.
 
-    The chain of p and p' ends in their common divisor. Divided by it, its first part has each root of p once.
+    The chain of p and p' ends in their common divisor. Divided by it, its first part has each root
+    of p once.
     """
 
     def __init__(self, p: Polynomial) -> None:

@@ -1,7 +1,10 @@
-"""The geometry of a table at one instant: half width, areas, outline, walls and normals, defined once.
+"""The geometry of a table at one instant.
 
-Plots, random starts, strategies, profiles and the generator of questions share these definitions. Steppers,
-verifier and theory define their own walls and volumes, so that an error here cannot hide in all of them.
+Half width, areas, outline, walls and normals, defined once.
+
+Plots, random starts, strategies, profiles and the generator of questions share these definitions.
+Steppers, verifier and theory define their own walls and volumes, so that an error here cannot hide
+in all of them.
 """
 
 from __future__ import annotations
@@ -25,7 +28,8 @@ class TableAt(NamedTuple):
 
     Attributes:
         scene: the table and its laws.
-        r, w, h: radius, half width of the mouth (of a stem's top), depth [length]; 0 where there is none.
+        r, w, h: radius, half width of the mouth (of a stem's top), depth [length]; 0 where there is
+            none.
         slope: of the stem's sides, tan(theta).
         r_rate, w_rate, h_rate: [length/time].
         slope_rate: [1/time].
@@ -113,7 +117,7 @@ class TableAt(NamedTuple):
         return (1.0 if wall == "left" else -1.0) / length, self.slope / length
 
     def receding(self, wall: Wall, y: float) -> float:
-        """Return minus the velocity [length/time] of a wall along its inward normal at y, in binary64."""
+        """Return minus the velocity of a wall along its inward normal at y [length/time]."""
         if wall == "arc":
             return float(self.r_rate)
         if wall in ("base", "floor"):
@@ -160,7 +164,10 @@ class TableAt(NamedTuple):
         return (w - slope * depth) * (2.0 * b - 1.0), depth
 
     def outline(self, n_arc: int = 180) -> list[list[tuple[float, float]]]:
-        """Return the walls as lines through points (x, y) [length]; a mushroom's mouth is left open."""
+        """Return the walls as lines through points (x, y) [length].
+
+        A mushroom's mouth is left open.
+        """
         r, w, foot, h = map(float, (self.r, self.w, self.half_width(-self.h), self.h))
         lines = []
         if not isinstance(self.scene, Stem):
@@ -186,13 +193,16 @@ def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
 
 
 def rounded(scene: Scene, t: float) -> TableAt:
-    """Evaluate a table to DIGITS digits and round once: the same binary64 numbers on every machine."""
+    """Evaluate a table to DIGITS digits and round once.
+
+    The same binary64 numbers on every machine.
+    """
     _, *numbers = table_at(decimals(DIGITS), scene, t)
     return TableAt(scene, *map(float, numbers))
 
 
 def placed(scene: Scene, state: State, wall: Wall, how: str) -> str:
-    """Say how far a state is from a wall that it does not name, and what to do if it leaves this wall.
+    """Say how far a state is from a wall that it does not name, and what to do about it.
 
     Args:
         scene: the table.

@@ -54,7 +54,7 @@ class Law(msgspec.Struct, frozen=True, dict=True):
 
     @property
     def level(self) -> float:
-        """Return the value of a constant law, else one of the law's own numbers that tells its size.
+        """Return a constant law's value, else a number of the law that tells its size.
 
         For a positive law it is within a factor of a few dozen of the largest value.
         """
@@ -88,7 +88,10 @@ class Law(msgspec.Struct, frozen=True, dict=True):
 
     @property
     def is_trigonometric(self) -> bool:
-        """Tell whether the law is `level` and the sum of its `harmonics`; a constant law is that."""
+        """Tell whether the law is `level` and the sum of its `harmonics`.
+
+        A constant law is that.
+        """
         return self.is_constant
 
     @property
@@ -130,7 +133,7 @@ class Law(msgspec.Struct, frozen=True, dict=True):
         return np.full(times.shape, found)
 
     def size_bounds(self) -> Bounds:
-        """Bound a law that is a size (radius, width, depth or nu), positive as its scene is valid."""
+        """Bound a law that is a size (radius, width, depth, nu), positive in a valid scene."""
         return self.bounds()
 
     def as_field(self) -> float | Law:
@@ -265,9 +268,9 @@ class Fourier(
     def size_bounds(self) -> Bounds:
         """Bound a law that is a size, positive as its scene is valid.
 
-        `bounds` subtracts all amplitudes from the mean. The result may be negative although the law is not:
-        1 + 0.9 cos x - 0.35 cos 3x is above 0.1. Here the least value is never below 0; a lower bound of 0
-        only says that the law is positive.
+        `bounds` subtracts all amplitudes from the mean. The result may be negative although the law
+        is not: 1 + 0.9 cos x - 0.35 cos 3x is above 0.1. Here the least value is never below 0; a
+        lower bound of 0 only says that the law is positive.
         """
         found = self.bounds()
         if found.lowest > 0.0:
@@ -311,7 +314,7 @@ class BangBang(Law, frozen=True, tag_field="kind", tag="bang-bang", forbid_unkno
 
     @cached_property
     def half_legs(self) -> tuple[PolynomialPiece, ...]:
-        """Return the parabolas of the period that begins at the first knot, also of a law at rest."""
+        """Return the parabolas of one period from the first knot on, also of a law at rest."""
         found = []
         for knot, next_knot in itertools.pairwise(self.knots):
             start, before = map(Fraction, knot)
@@ -369,14 +372,14 @@ class BangBang(Law, frozen=True, tag_field="kind", tag="bang-bang", forbid_unkno
         return ConstantPiece(self.knots[0][1]) if self.is_constant else self.leg_at(time)
 
     def value(self, ctx: Any, t: Any, order: int = 0) -> Any:
-        """Evaluate the law, or a derivative, at a point of time: on the piece that holds there exactly."""
+        """Evaluate the law, or a derivative, on the piece that holds at a time exactly."""
         if isinstance(t, np.ndarray):
             return self.values(t, order)
         time = Fraction(*map(int, t.as_integer_ratio()))  # of mpf the parts are integers of gmpy2
         return self.piece_at(time).evaluate(ctx, t, order)
 
     def values(self, times: FloatArray, order: int = 0) -> FloatArray:
-        """Evaluate the law, or its derivative of order 1 or 2, in binary64 at times of any shape."""
+        """Evaluate the law, or a derivative, in binary64 at times of any shape."""
         if self.is_constant:
             return super().values(times, order)
         knots = np.array([t for t, _ in self.knots])
@@ -464,19 +467,26 @@ def law_of(given: float | Law) -> Law:
 
 
 def shared_cycle(laws: Iterable[Law]) -> Period | None:
-    """Return the period of the first law that moves, which all moving laws share; None if nothing moves."""
+    """Return the period of the first law that moves, which all moving laws share.
+
+    None if nothing moves.
+    """
     return next((law.cycle for law in laws if not law.is_constant), None)
 
 
 def first_origin(laws: Iterable[Law]) -> float:
-    """Return when a cycle begins [time]: at the first knot of the first law that has knots, else at 0."""
+    """Return when a cycle begins [time].
+
+    At the first knot of the first law that has knots, else at 0.
+    """
     return next((law.origin for law in laws if law.origin is not None), 0.0)
 
 
 def times_power(number: float, exponent: int) -> float:
     """Return a number times 2^exponent, infinite where that overflows.
 
-    The power itself need not be a float: 2^1000 times 2^-1080 is 2^-80, though 2^-1080 is rounded to 0.
+    The power itself need not be a float: 2^1000 times 2^-1080 is 2^-80, though 2^-1080 is rounded
+    to 0.
     """
     try:
         return math.ldexp(number, exponent)
@@ -517,7 +527,7 @@ def checked_knot(i: int, knot: object) -> tuple[float, float]:
 
 
 def check_legs(knots: tuple[tuple[float, float], ...]) -> None:
-    """Refuse knots whose times do not increase, that do not close, or whose span is not a binary64 number.
+    """Refuse knots that do not rise in time, do not close, or whose span is no binary64 number.
 
     Raises:
         InvalidScene: naming the knot, the value and the bound.
@@ -529,7 +539,8 @@ def check_legs(knots: tuple[tuple[float, float], ...]) -> None:
     end, last = knots[-1]
     if last != first:
         raise InvalidScene(
-            f"bang-bang.knots[{len(knots) - 1}] value = {last}, must equal the first ({first}): no jumps"
+            f"bang-bang.knots[{len(knots) - 1}] value = {last}, must equal the first ({first}): "
+            "no jumps"
         )
     span = end - start
     if not math.isfinite(span) or Fraction(span) != Fraction(end) - Fraction(start):

@@ -22,7 +22,7 @@ SHOWN = "".join(c if " " <= c <= "~" else f"\\u{ord(c):04x}" for c in f"^[^{HIDD
 
 
 def catalogue() -> list[str]:
-    """Return the names of the scenes that ship with the package, `moving-cap-as-printed` included."""
+    """Return the names of the scenes that ship with the package, also of the refused one."""
     folder = resources.files("scene") / "catalogue"
     return sorted(
         entry.name.removesuffix(".toml")
@@ -76,7 +76,10 @@ def read_data(source: str | Path) -> Any:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object. Refuse a key that stands twice, as TOML does: one value would be lost."""
+    """Return a JSON object. Refuse a key that stands twice, as TOML does.
+
+    One value would be lost.
+    """
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:
@@ -150,7 +153,10 @@ def _at(data: Any, names: list[str]) -> Any:
 
 
 def to_data(scene: Scene) -> dict[str, Any]:
-    """Return a scene as plain data, in the form of the protocol. A law keeps its `omega` or its `period`."""
+    """Return a scene as plain data, in the form of the protocol.
+
+    A law keeps its `omega` or its `period`.
+    """
     check_scene(scene)
     data: dict[str, Any] = msgspec.to_builtins(scene)
     return {name: _without_none(field) for name, field in data.items()}
@@ -183,7 +189,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def limit_definitions(definitions: dict[str, Any]) -> None:
-    """Put what a schema can say of the rules for scenes (`scene.protocol.rules`) into its definitions."""
+    """Put what a schema can say of `scene.protocol.rules` into its definitions."""
     fourier = definitions["Fourier"]
     knots = definitions["BangBang"]["properties"]["knots"]
     for field in ("omega", "period"):

@@ -1,13 +1,17 @@
-"""Where in a cycle the mouth narrows: the local minima of nu = w / r, by algebra on each analytic piece.
+"""Where in a cycle the mouth narrows.
 
-Idea. The sign of nu' is that of N = w' r - w r'. Time is cut where a law is not analytic and, where a Fourier
-law moves, into parts of half a wavelength. Between cuts N is interpolated by a Chebyshev series that rounding
-alone limits, and its zeros are eigenvalues, polished by Newton's method. Between neighbours among all cuts
-and zeros nu is monotone, so its values there show every rise and fall: a zero too many (of a flat inflection,
-or by rounding) does no harm, and none that matters is missed.
+The local minima of nu = w / r, by algebra on each analytic piece.
 
-A swing of nu below SWING of its largest value is rounding, and counts as none: the two minima beside so low a
-peak are one, and a nu that never swings more has no minimum at all. A plateau counts once, by its middle.
+Idea. The sign of nu' is that of N = w' r - w r'. Time is cut where a law is not analytic and, where
+a Fourier law moves, into parts of half a wavelength. Between cuts N is interpolated by a Chebyshev
+series that rounding alone limits, and its zeros are eigenvalues, polished by Newton's method.
+Between neighbours among all cuts and zeros nu is monotone, so its values there show every rise and
+fall: a zero too many (of a flat inflection, or by rounding) does no harm, and none that matters is
+missed.
+
+A swing of nu below SWING of its largest value is rounding, and counts as none: the two minima
+beside so low a peak are one, and a nu that never swings more has no minimum at all. A plateau
+counts once, by its middle.
 """
 
 from collections.abc import Callable
@@ -26,7 +30,8 @@ FloatArray = npt.NDArray[np.float64]
 Motion = Callable[[FloatArray], FloatArray]
 
 SWING = 2.0**-44  # a few hundred roundings, as sums of sixteen harmonics gather them
-DEGREE = 24  # over half a wavelength the series of cos and sin, times a quadratic, is below 2^-53 from there
+# Over half a wavelength the series of cos and sin, times a quadratic, is below 2^-53 from there.
+DEGREE = 24
 NODES = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
 TO_SERIES = np.linalg.inv(chebyshev.chebvander(NODES, DEGREE)).T
 
@@ -56,8 +61,9 @@ def mouth_minima(scene: Scene) -> tuple[float, ...]:
         scene: a valid scene; only a mushroom has a mouth.
 
     Returns:
-        Phases (fractions of the cycle, rising, in (0, 1]) at which nu has a local minimum; one at the instant
-        that ends a cycle and begins the next belongs to the one that it ends. None for a nu that is constant.
+        Phases (fractions of the cycle, rising, in (0, 1]) at which nu has a local minimum; one at
+        the instant that ends a cycle and begins the next belongs to the one that it ends. None for
+        a nu that is constant.
 
     Source: sec. 3.2, capture while nu falls, release when it has risen.
     """
@@ -70,7 +76,8 @@ def mouth_minima(scene: Scene) -> tuple[float, ...]:
     span = scene.period
     w, r = (_motion(law, start, span) for law in (width, radius))
     cuts = _cuts(start, span, (width, radius))
-    # Legs too short for their squares give nan: their zeros drop out, their ends among the cuts stay.
+    # Legs too short for their squares give nan: their zeros drop out, their ends among the cuts
+    # stay.
     with np.errstate(all="ignore"):
         zeros = _zeros(w, r, cuts)
         phases = np.unique(np.concatenate([cuts[:-1], zeros[(zeros >= 0.0) & (zeros < 1.0)]]))
@@ -84,7 +91,10 @@ def _in_cycle(phase: float) -> float:
 
 
 def _motion(law: Law, start: float, span: float) -> Motion:
-    """Return a law's motion over a cycle, divided by its highest value: only the ratios of nu matter."""
+    """Return a law's motion over a cycle, divided by its highest value.
+
+    Only the ratios of nu matter.
+    """
     highest = law.bounds().highest
 
     def motion(u: FloatArray) -> FloatArray:
@@ -96,7 +106,7 @@ def _motion(law: Law, start: float, span: float) -> Motion:
 
 
 def _cuts(start: float, span: float, factors: tuple[Law, Law]) -> FloatArray:
-    """Return phases from 0 to 1 between which N is analytic and its waves make half a turn at most."""
+    """Return phases between which N is analytic and its waves make half a turn at most."""
     waves = [law.harmonics() for law in factors if law.harmonics()]
     parts = 2 * sum(harmonics[-1][0] for harmonics in waves)
     knots = [float(t - Fraction(start)) / span for law in factors for t in law.breakpoints()]
@@ -133,7 +143,10 @@ def _zeros(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
 
 
 def _minima(w: Motion, r: Motion, phases: FloatArray) -> list[float]:
-    """Return where nu is least in each of its valleys; it is monotone between neighbours among `phases`."""
+    """Return where nu is least in each of its valleys.
+
+    It is monotone between neighbours among `phases`.
+    """
     at_w = w(phases)
     at_r = r(phases)
     nu = at_w[0] / at_r[0]
@@ -165,7 +178,7 @@ def _minima(w: Motion, r: Motion, phases: FloatArray) -> list[float]:
 
 
 def _lowest(w: Motion, r: Motion, u: FloatArray, slope: FloatArray) -> float:
-    """Return the middle of a plateau, else the place of least slope, of places equal within rounding."""
+    """Return the middle of a plateau; else, of equal places, that of least slope."""
     middle = np.array([0.5 * (u[0] + u[-1])])
     at_w = w(middle % 1.0)
     at_r = r(middle % 1.0)

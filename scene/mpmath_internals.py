@@ -1,9 +1,11 @@
-"""What this project uses of mpmath's inside: raw numbers, and the functions of `mpmath.libmp` on them.
+"""What this project uses of mpmath's inside.
 
-A raw number is the tuple that mpmath keeps in a number. An interval holds two. The functions on them
-are exact or round as the caller says. No precision of a system has an effect. No other file names
-these parts of mpmath. `tests/test_scene_mpmath_internals.py` tests each for the meaning that we rely
-on: a release of mpmath that changes one fails there first, by name.
+Raw numbers, and the functions of `mpmath.libmp` on them.
+
+A raw number is the tuple that mpmath keeps in a number. An interval holds two. The functions on
+them are exact or round as the caller says. No precision of a system has an effect. No other file
+names these parts of mpmath. `tests/test_scene_mpmath_internals.py` tests each for the meaning that
+we rely on: a release of mpmath that changes one fails there first, by name.
 
 Only functions known to be sound are here. mpmath's interval `exp` is not.
 """
@@ -59,7 +61,7 @@ def parts(raw: Raw) -> tuple[int, int]:
 
 
 def quick_operation(kind: Any, name: str, bits: int) -> Callable[[Any, Any], Any]:
-    """Return an operation of a system's intervals that spares two of them mpmath's search for kinds.
+    """Return an operation that spares two intervals mpmath's search for kinds.
 
     What is computed, and by which function of mpmath's, is the same; all else goes mpmath's way.
 
@@ -83,6 +85,9 @@ def quick_operation(kind: Any, name: str, bits: int) -> Callable[[Any, Any], Any
 
 
 def know_constants(bits: int) -> None:
-    """Compute pi, ln 2 and ln 10 to so many bits: what asks for fewer changes nothing afterwards."""
+    """Compute pi, ln 2 and ln 10 to so many bits.
+
+    What asks for fewer changes nothing afterwards.
+    """
     for constant in (libelefun.pi_fixed, libelefun.ln2_fixed, libelefun.ln10_fixed):
         constant(bits)

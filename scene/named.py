@@ -1,4 +1,4 @@
-"""Scenes by name: those of the catalogue, and those that the audit of the paper needs beside them."""
+"""Scenes by name: those of the catalogue, and those that only the audit of the paper needs."""
 
 from scene.laws import BangBang, Fourier
 from scene.load import catalogue, load

@@ -1,4 +1,7 @@
-"""What a notebook shows of a scene, a prediction, an ensemble: plain HTML, with no plotting library."""
+"""What a notebook shows of a scene, a prediction, an ensemble.
+
+Plain HTML, with no plotting library.
+"""
 
 from collections.abc import Mapping
 from html import escape
@@ -52,6 +55,7 @@ def _picture(scene: Scene, span: float) -> str:
         for outline, shade in zip(outlines, SHADES, strict=False)
         for line in outline
     ]
-    box = f"{left - unit:.6g} {-top - unit:.6g} {right - left + 2 * unit:.6g} {top - bottom + 2 * unit:.6g}"
+    corner = f"{left - unit:.6g} {-top - unit:.6g}"
+    box = f"{corner} {right - left + 2 * unit:.6g} {top - bottom + 2 * unit:.6g}"
     size = f"width='{SIZE}' height='{SIZE}' viewBox='{box}'"
     return f"<svg {size} role='img' aria-label='walls'>{''.join(lines)}</svg>"

@@ -55,7 +55,10 @@ class Period(NamedTuple):
         return 2 * ctx.pi / ctx.mpf(self.omega)
 
     def frequency(self, ctx: Any) -> Any:
-        """Return 2 pi / period [1/time] in a number system; in `iv` an enclosure where it is irrational."""
+        """Return 2 pi / period [1/time] in a number system.
+
+        In `iv` an enclosure where it is irrational.
+        """
         if self.length is not None:
             return 2 * ctx.pi / exact(ctx, self.length)
         return ctx.mpf(self.omega)
@@ -86,7 +89,10 @@ class ConstantPiece(NamedTuple):
 
 
 class PolynomialPiece(NamedTuple):
-    """sum_k coefficients[k] (t - origin)^k until `end`, all exact rationals; at least one coefficient."""
+    """sum_k coefficients[k] (t - origin)^k until `end`, all exact rationals.
+
+    At least one coefficient.
+    """
 
     origin: Fraction
     coefficients: tuple[Fraction, ...]
@@ -106,7 +112,8 @@ class PolynomialPiece(NamedTuple):
             order: 0, 1 or 2.
 
         Returns:
-            A number of ctx: [length], [length/time] or [length/time^2]; slopes and nu have no length.
+            A number of ctx: [length], [length/time] or [length/time^2]; slopes and nu have no
+            length.
         """
         x = t - exact(ctx, self.origin)
         numbers = [exact(ctx, number) for number in self.coefficients]
@@ -149,7 +156,7 @@ class PolynomialPiece(NamedTuple):
 
 
 class TrigonometricPiece(NamedTuple):
-    """mean + sum over harmonics (k, c, s) of c cos(k omega t) + s sin(k omega t); one harmonic at least."""
+    """mean + sum over harmonics (k, c, s) of c cos(k omega t) + s sin(k omega t)."""
 
     mean: float
     harmonics: tuple[tuple[int, float, float], ...]

@@ -1,15 +1,16 @@
 """Number systems of mpmath: one for each kind and precision, in each thread.
 
-Making one takes 3 ms, longer than most of what is then computed in it. mpmath raises a system's precision
-while it evaluates a function and then puts it back: two threads must not share one, and nobody may change the
-precision of a system that was handed out here. mpmath keeps pi and the precision that it was computed to in
-two variables that all systems share: a thread that reads one before and the other after a change would get a
-wrong pi. Proofs therefore read it with the lock CONSTANTS held.
+Making one takes 3 ms, longer than most of what is then computed in it. mpmath raises a system's
+precision while it evaluates a function and then puts it back: two threads must not share one, and
+nobody may change the precision of a system that was handed out here. mpmath keeps pi and the
+precision that it was computed to in two variables that all systems share: a thread that reads one
+before and the other after a change would get a wrong pi. Proofs therefore read it with the lock
+CONSTANTS held.
 
-mpmath copies and pickles a number by rounding it to the precision that its global system has at that
-moment, 15 digits by default. So each number that users get is an `ExactMpf` or belongs to a system of
-`Decimals`: their copies are equal to the last bit. A record that may also hold numbers of a caller's own
-system uses `reduce_record`.
+mpmath copies and pickles a number by rounding it to the precision that its global system has at
+that moment, 15 digits by default. So each number that users get is an `ExactMpf` or belongs to a
+system of `Decimals`: their copies are equal to the last bit. A record that may also hold numbers of
+a caller's own system uses `reduce_record`.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ CONSTANTS = threading.Lock()
 class Decimals(MPContext):  # type: ignore[misc]  # mpmath has no types
     """mpmath's numbers with so many decimals, whose copies and pickles keep every bit.
 
-    A copy belongs to a system of its own, of the same precision; numbers that are copied together share it.
+    A copy belongs to a system of its own, of the same precision; numbers that are copied together
+    share it.
     """
 
     def __init__(self, digits: int) -> None:
@@ -41,7 +43,7 @@ class Decimals(MPContext):  # type: ignore[misc]  # mpmath has no types
 
 
 class ExactMpf(mp.mpf):  # type: ignore[misc]
-    """A number of mpmath's global system `mp`, of any length, whose copies and pickles keep every bit."""
+    """A number of mpmath's global system `mp`, whose copies and pickles keep every bit."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Tell pickle and copy how to make the same number."""
@@ -131,7 +133,10 @@ def intervals(bits: int) -> Any:
 
 
 def _make_quick(system: Any, bits: int) -> None:
-    """Spare a system's intervals mpmath's search for kinds; compute cosine and sine together, and pi once."""
+    """Spare a system's intervals mpmath's search for kinds.
+
+    Compute cosine and sine together, and pi once.
+    """
 
     def cos_sin(x: Any) -> tuple[Any, Any]:
         with CONSTANTS:

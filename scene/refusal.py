@@ -1,7 +1,7 @@
 """Bad input: the one error that it raises, and the checks that public entries share.
 
-A public entry checks what it is given before any arithmetic, so that a wrong type or a nan ends in one
-line that names the field, the value and the bound, never in a traceback from deep inside.
+A public entry checks what it is given before any arithmetic, so that a wrong type or a nan ends in
+one line that names the field, the value and the bound, never in a traceback from deep inside.
 """
 
 import math

@@ -19,7 +19,8 @@ class State(msgspec.Struct, frozen=True, gc=False, forbid_unknown_fields=True):
     """A particle in flight.
 
     `wall` names the wall that the particle is leaving, or is None. The particle is on that wall by
-    definition: the residual of (x, y) is subtracted from the wall's f, so rounding yields no false hit.
+    definition: the residual of (x, y) is subtracted from the wall's f, so rounding yields no false
+    hit.
     """
 
     t: float

@@ -1,19 +1,19 @@
 """Tables: cap, stem and mushroom, and the walls that each of them has.
 
-A scene is a table with its laws of motion. It is proved valid when it is made: by a constructor, by decoding,
-by replacing a field, by unpickling. (`msgspec.structs.force_setattr` and a subclass that replaces
-`__post_init__` bypass the proof.) The tables are:
+A scene is a table with its laws of motion. It is proved valid when it is made: by a constructor, by
+decoding, by replacing a field, by unpickling. (`msgspec.structs.force_setattr` and a subclass that
+replaces `__post_init__` bypass the proof.) The tables are:
     Cap:      x^2 + y^2 <= r(t)^2, y >= 0, the base closed;
     Stem:     |x| <= w(t) + slope(t) y, -h(t) <= y <= 0, the top closed;
     Mushroom: both, joined through the mouth y = 0, |x| < w(t).
 The mouth is given by `w` (half-width, a length) or by `nu` (w = nu r).
 
-A scene is valid if r, h, w > 0, w <= r and w > h slope at all times, and if all its moving laws have
-exactly the same period. The proof covers one period, and the theory is about cycles. The period of a
-bang-bang law is rational. That of a Fourier law with `omega` is 2 pi / omega, which is irrational, so the
-two never agree. A Fourier law with `period` can agree with a bang-bang law. A law that moves several times
-faster is written with higher harmonics (the k-th number of `cos` and `sin` belongs to k omega) or with
-repeated knots.
+A scene is valid if r, h, w > 0, w <= r and w > h slope at all times, and if all its moving laws
+have exactly the same period. The proof covers one period, and the theory is about cycles. The
+period of a bang-bang law is rational. That of a Fourier law with `omega` is 2 pi / omega, which is
+irrational, so the two never agree. A Fourier law with `period` can agree with a bang-bang law. A
+law that moves several times faster is written with higher harmonics (the k-th number of `cos` and
+`sin` belongs to k omega) or with repeated knots.
 """
 
 import re
@@ -102,7 +102,7 @@ class _Table(
 
 
 def _check_text(field: str, text: object) -> None:
-    """Refuse a value that is not text, and characters that a terminal, page or picture cannot show."""
+    """Refuse what is not text, and characters that no terminal, page or picture shows."""
     if not isinstance(text, str):
         raise InvalidScene(f"{field} = {shown(text)}, must be text")
     found = HIDDEN.search(text)
@@ -169,8 +169,8 @@ def check_scene(scene: object) -> None:
 
 @lru_cache(maxsize=4096)
 def _prove(table: type[_Table], given: tuple[GivenLaw | None, ...]) -> None:
-    # Cached by value: -0.0 and 0.0 count as equal, and validity is a matter of real numbers. A refusal is
-    # not kept, so its message shows the numbers at hand.
+    # Cached by value: -0.0 and 0.0 count as equal, and validity is a matter of real numbers. A
+    # refusal is not kept, so its message shows the numbers at hand.
     found = {
         name: law_of(law) for name, law in zip(PARAMETERS, given, strict=True) if law is not None
     }
@@ -180,7 +180,7 @@ def _prove(table: type[_Table], given: tuple[GivenLaw | None, ...]) -> None:
 
 
 def _conditions(found: dict[str, Law]) -> list[Condition]:
-    """List what must hold at all times for a table with these laws (sec. 2, here with a strict apex)."""
+    """List what must hold at all times with these laws (sec. 2, with a strict apex)."""
     listed = [
         Condition(f"{name} > 0", ((1, (law,)),)) for name, law in found.items() if name != "slope"
     ]

@@ -31,14 +31,17 @@ def mirrored(state: State) -> State:
 
 
 def scaled_state(state: State, length: int, time: int) -> State:
-    """Return the state with lengths times 2^length and times times 2^time, velocities accordingly."""
+    """Return the state with lengths times 2^length and times times 2^time."""
     x, y = (times_power(number, length) for number in (state.x, state.y))
     vx, vy = (times_power(number, length - time) for number in (state.vx, state.vy))
     return State(times_power(state.t, time), x, y, vx, vy, state.wall)
 
 
 def scaled(scene: Table, length: int, time: int) -> Table:
-    """Return the scene with lengths times 2^length and times times 2^time; `nu` and `slope` do not change."""
+    """Return the scene with lengths times 2^length and times times 2^time.
+
+    `nu` and `slope` do not change.
+    """
     return _with_laws(
         scene, lambda name, law: law.scaled(0 if name in ("nu", "slope") else length, time)
     )
@@ -57,7 +60,8 @@ def backwards(scene: Table) -> Table:
 def frozen(scene: Table, t: float) -> Table:
     """Return the static scene with the parameters that it has at time t, rounded.
 
-    They are computed to 50 digits and rounded once, so that parameters which touch (w = r, nu = 1) still do.
+    They are computed to 50 digits and rounded once, so that parameters which touch (w = r, nu = 1)
+    still do.
     """
     return _with_laws(scene, lambda _, law: Constant(float(law.value(decimals(50), t))))
 

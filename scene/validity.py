@@ -3,16 +3,16 @@
 Each condition is the sign of a sum of products of laws. For trigonometric laws the
 substitution x = tan(omega t / 2) makes it a rational polynomial over the real line, for
 bang-bang laws it is one on each leg. `scene.exact` decides its sign, and contact too: nu = 1
-at one instant is valid, nu > 1 by one unit in the last place is not. If laws of both kinds move in a
-condition, intervals decide it. Then the two sides must not touch: contact is refused.
+at one instant is valid, nu > 1 by one unit in the last place is not. If laws of both kinds move in
+a condition, intervals decide it. Then the two sides must not touch: contact is refused.
 
-A condition of both kinds is no polynomial, but it is smooth on each leg of the bang-bang laws. On an interval
-of half-width h about m the mean value theorem says
+A condition of both kinds is no polynomial, but it is smooth on each leg of the bang-bang laws. On
+an interval of half-width h about m the mean value theorem says
 
     f(t) lies in f(m) + f'([m - h, m + h]) [-h, h]    for |t - m| <= h.
 
-An interval is done if all of that is positive; otherwise it is halved. Near a contact no interval is small
-enough. The search then ends and reports where.
+An interval is done if all of that is positive; otherwise it is halved. Near a contact no interval
+is small enough. The search then ends and reports where.
 """
 
 import itertools
@@ -83,7 +83,8 @@ def check_common_period(laws: Laws) -> None:
             one, other = (ctx.nstr(shared.value(ctx), 17) for shared in (a, b))
             raise InvalidScene(
                 f"{first} has period {one} and {second} has {other}:"
-                f" all laws that move must share one period exactly; {_remedy(laws, first, second, a, b)}"
+                " all laws that move must share one period exactly; "
+                f"{_remedy(laws, first, second, a, b)}"
             )
 
 
@@ -91,7 +92,8 @@ def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
     if (a.length is None) != (b.length is None):
         by_omega, length = (first, b.length) if a.length is None else (second, a.length)
         assert length is not None
-        return f"{by_omega} gives omega, so its period is irrational: give it period = {float(length)} instead"
+        instead = f"give it period = {float(length)} instead"
+        return f"{by_omega} gives omega, so its period is irrational: {instead}"
     if laws[first].breakpoints() and laws[second].breakpoints():
         return "repeat the knots of the shorter, or let it rest until the longer ends"
     return (
@@ -101,19 +103,27 @@ def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
 
 
 def _is_clear(condition: Condition) -> bool:
-    """Tell whether the ranges of the laws prove a condition. For most scenes they do, at little cost."""
+    """Tell whether the ranges of the laws prove a condition.
+
+    For most scenes they do, at little cost.
+    """
+    ranges = [law.bounds()[:2] for _, factors in condition.terms for law in factors]
+    if not all(isfinite(end) for ends in ranges for end in ends):
+        return False
     # Of two floats the sum has the right sign; products are taken exactly.
-    level = float if all(len(factors) == 1 for _, factors in condition.terms) else Fraction
-    least = level(0)
-    for sign, factors in condition.terms:
-        ends = [level(sign)]
-        for law in factors:
-            lowest, highest, *_ = law.bounds()
-            if not (isfinite(lowest) and isfinite(highest)):
-                return False
-            ends = [end * level(bound) for end in ends for bound in (lowest, highest)]
-        least += min(ends)
+    is_sum = all(len(factors) == 1 for _, factors in condition.terms)
+    level = float if is_sum else Fraction
+    least = sum((_least_of(level, sign, factors) for sign, factors in condition.terms), level(0))
     return least > 0 or (least == 0 and not condition.is_strict)
+
+
+def _least_of(level: type[float] | type[Fraction], sign: int, factors: tuple[Law, ...]) -> Any:
+    """Return the least value of sign * product(laws) over the ranges of the laws."""
+    ends = [level(sign)]
+    for law in factors:
+        lowest, highest, *_ = law.bounds()
+        ends = [end * level(bound) for end in ends for bound in (lowest, highest)]
+    return min(ends)
 
 
 def _check(laws: Laws, condition: Condition) -> None:
@@ -121,21 +131,32 @@ def _check(laws: Laws, condition: Condition) -> None:
         return
     used = [law for _, factors in condition.terms for law in factors if not law.is_constant]
     legs = [law for law in used if law.breakpoints()]
-    if not (all(law.is_polynomial for law in used) or all(law.is_trigonometric for law in used)):
-        verdict = sign_on_legs(condition.terms, condition.is_strict, leg_intervals(legs))
-        if verdict.holds is None:
-            raise InvalidScene(
-                f"{condition.text} cannot be shown near t = {float(verdict.time):.6g}: where Fourier and"
-                " bang-bang laws meet in one condition its sides must keep apart: here they touch, or nearly"
-            )
-        if not verdict.holds:
-            raise InvalidScene(_message(laws, condition, verdict.time))
-        return
-    for p, a, b in _on_legs(condition, legs) if legs else _on_circle(condition):
-        if exact.negative_point(p, a, b) is not None or (
-            condition.is_strict and exact.vanishes(p, a, b)
-        ):
+    if all(law.is_polynomial for law in used) or all(law.is_trigonometric for law in used):
+        parts = _on_legs(condition, legs) if legs else _on_circle(condition)
+        if any(_is_broken(condition, p, a, b) for p, a, b in parts):
             raise InvalidScene(_message(laws, condition))
+    else:
+        _check_by_intervals(laws, condition, legs)
+
+
+def _is_broken(condition: Condition, p: exact.Polynomial, a: Fraction, b: Fraction) -> bool:
+    """Tell whether a condition's polynomial is too small somewhere in [a, b]."""
+    if exact.negative_point(p, a, b) is not None:
+        return True
+    return condition.is_strict and exact.vanishes(p, a, b)
+
+
+def _check_by_intervals(laws: Laws, condition: Condition, legs: Sequence[Law]) -> None:
+    """Check a condition in which laws of several forms meet."""
+    verdict = sign_on_legs(condition.terms, condition.is_strict, leg_intervals(legs))
+    if verdict.holds is None:
+        raise InvalidScene(
+            f"{condition.text} cannot be shown near t = {float(verdict.time):.6g}: where Fourier"
+            " and bang-bang laws meet in one condition its sides must keep apart: here they touch,"
+            " or nearly"
+        )
+    if not verdict.holds:
+        raise InvalidScene(_message(laws, condition, verdict.time))
 
 
 class SignVerdict(NamedTuple):
@@ -175,7 +196,7 @@ def sign_on_legs(
 
 
 def enclose(terms: Terms, m: Fraction, h: Fraction) -> tuple[Interval, Interval]:
-    """Enclose the sum of sign * product(laws) at m, and within h of m on the pieces that hold at m."""
+    """Enclose the sum of sign * product(laws) at m, and within h of m on the pieces at m."""
     ctx = intervals(BITS)
     t = number(ctx, m)
     away = number(ctx, h) * ctx.mpf([-1, 1])
@@ -227,7 +248,10 @@ def _on_circle(condition: Condition) -> Iterator[tuple[exact.Polynomial, Fractio
 
 
 def _least(condition: Condition, start: float, span: float, n: int) -> Sequence[int]:
-    """Return after which n-ths of a period a condition's excess may be least; all, if floats do not tell."""
+    """Return after which n-ths of a period a condition's excess may be least.
+
+    All, if floats do not tell.
+    """
     # Floats know t, and hence the phase of a wave, to some 2^-52 of it: here to 2^-30 of a turn.
     if not abs(start) + span < 2.0**18 * span:
         return range(n)
@@ -244,7 +268,8 @@ def _least(condition: Condition, start: float, span: float, n: int) -> Sequence[
 
 
 def _message(laws: Laws, condition: Condition, known: Fraction | None = None) -> str:
-    # The proof is done; this only looks for an instant to show in the message. In mp no scene overflows.
+    # The proof is done; this only looks for an instant to show in the message. In mp no scene
+    # overflows.
     ctx = decimals()
     shared = shared_cycle(laws.values())
     span, n = (shared.value(ctx), 512) if shared else (ctx.mpf(0), 1)

@@ -1,9 +1,9 @@
 """The paper's closed forms and quadratures, at any precision.
 
-`volumes` has the formulas for volumes of phase space. `cycle` computes when particles are captured and
-released, `adiabatic` how their energy changes, and `prediction` the figures of one cycle. `branches` has its
-curves, `density` and `distribution` the energies after one cycle, `distribution` those after many cycles too.
-`finite_energy` goes beyond the paper.
+`volumes` has the formulas for volumes of phase space, and refuses scenes that theory does not cover.
+`cycle` computes when particles are captured and released, `adiabatic` how their energy changes, and
+`prediction` the figures of one cycle. `branches` has its curves, `density` and `distribution` the energies
+after one cycle, `distribution` those after many cycles too. `finite_energy` goes beyond the paper.
 """
 
 from theory.adiabatic import NotConverged

@@ -1,10 +1,10 @@
 """The messages of protocol 1, both directions, and their published JSON Schema.
 
-Requests are decoded strictly: an unknown field is refused. (`docs/protocol.md` says where an implementation
-may ignore one.) Unknown fields of answers are ignored. `dt` and `wall` of a collision may be absent, for
-engines that do not know them. A scene is not decoded here, but once, by the stepper. In protocol and schema
-a request has the name of its class without the suffix. `python -m scene.protocol.messages >
-docs/protocol.schema.json` prints the schema.
+Requests are decoded strictly: an unknown field is refused. (`docs/protocol.md` says where an
+implementation may ignore one.) Unknown fields of answers are ignored. `dt` and `wall` of a
+collision may be absent, for engines that do not know them. A scene is not decoded here, but once,
+by the stepper. In protocol and schema a request has the name of its class without the suffix.
+`python -m scene.protocol.messages > docs/protocol.schema.json` prints the schema.
 """
 
 import json
@@ -67,7 +67,10 @@ class FlowRequest(_Question, frozen=True, tag="flow"):
 
 
 class TimeRequest(_Question, frozen=True, tag="time"):
-    """Asks how long a trajectory of that many collisions takes, `repeat` times over; answered by Timed."""
+    """Asks how long a trajectory of that many collisions takes, `repeat` times over.
+
+    Answered by Timed.
+    """
 
     state: State
     collisions: int
@@ -137,7 +140,10 @@ Answered = AnsweredCollision | Horizon | Undefined | Undecided | Rejected
 
 
 class Steps(msgspec.Struct, frozen=True):
-    """The collisions of a trajectory. If it ended early, the last entry is the outcome that ended it."""
+    """The collisions of a trajectory.
+
+    If it ended early, the last entry is the outcome that ended it.
+    """
 
     seq: Seq
     steps: tuple[Answered, ...]
@@ -171,7 +177,10 @@ class LostRejected(Rejected, frozen=True, omit_defaults=True, tag="rejected"):
 
 
 class Flown(msgspec.Struct, frozen=True):
-    """The particles of a flow at t_end, in order. A lost particle has a reason and no capture interval."""
+    """The particles of a flow at t_end, in order.
+
+    A lost particle has a reason and no capture interval.
+    """
 
     seq: Seq
     states: tuple[Arrival | LostUndefined | LostUndecided | LostRejected, ...]
@@ -186,7 +195,10 @@ class Timed(msgspec.Struct, frozen=True):
 
 
 class Failed(msgspec.Struct, frozen=True):
-    """The implementation reports that it failed at this question. It counts as an error, not as a crash."""
+    """The implementation reports that it failed at this question.
+
+    It counts as an error, not as a crash.
+    """
 
     seq: Seq
     error: str
@@ -200,7 +212,9 @@ _MAY_HAVE_ZEROS = re.compile(rb"-0(?:[\s,\]}]|\Z)")
 
 
 def with_minus_zeros(line: bytes) -> bytes:
-    """Replace -0 by -0.0 in a line of JSON. C writes minus zero as -0, and decoders read that as an integer.
+    """Replace -0 by -0.0 in a line of JSON.
+
+    C writes minus zero as -0, and decoders read that as an integer.
 
     In fields that are whole numbers -0 is not replaced: it is 0.
 

@@ -1,7 +1,8 @@
 """The rules of protocol 1 in one table, and what may be answered to a question that breaks one.
 
-Each rule is a condition on a part of a question, or of an answer. A question that keeps all rules has one
-right answer, and no other passes. `otherwise` says what is answered to a question that breaks the rule.
+Each rule is a condition on a part of a question, or of an answer. A question that keeps all rules
+has one right answer, and no other passes. `otherwise` says what is answered to a question that
+breaks the rule.
 
 Readers of the table are:
 
@@ -11,8 +12,9 @@ Readers of the table are:
 - the makers of vectors and the grading: `may_be_refused`, `without_loose`, `does_undecided_pass`;
 - the draws of good and bad questions: `conformance.cases.rules`, a function for each name.
 
-The verifier states the rules again, because it imports nothing of ours. tests/test_conformance_rules.py
-breaks each rule before each reader. CONTRIBUTING says how a rule is added.
+The verifier states the rules again, because it imports nothing of ours.
+tests/test_conformance_rules.py breaks each rule before each reader. CONTRIBUTING says how a rule is
+added.
 """
 
 from collections.abc import Mapping, Set
@@ -30,9 +32,11 @@ from scene.tables import HIDDEN, Cap, Mushroom, Scene, Stem
 
 LATE = 2**30  # periods from time 0, or units of time if nothing moves
 LARGE = Fraction(10**100)
-# pi to 99 decimals: the product of two binary64 numbers has 32 digits, and lies on one side of pi 2^31.
+# pi to 99 decimals: the product of two binary64 numbers has 32 digits, and lies on one side of pi
+# 2^31.
 PI = Fraction(
-    "3.141592653589793238462643383279502884197169399375105820974944592307816406286208998628034825342117068"
+    "3.14159265358979323846264338327950288419716939937510"
+    "5820974944592307816406286208998628034825342117068"
 )
 
 TABLES: dict[str, type[msgspec.Struct]] = {"cap": Cap, "stem": Stem, "mushroom": Mushroom}
@@ -81,8 +85,8 @@ class ProtocolRule(NamedTuple):
         condition: when it is kept, as the page says it.
         otherwise: what is answered if it is broken.
         why: the reason for what was decided; empty where it needs none.
-        in_schema: whether the JSON Schema tells that it is broken. A schema knows no relations between
-            numbers.
+        in_schema: whether the JSON Schema tells that it is broken. A schema knows no relations
+            between numbers.
     """
 
     name: str
@@ -119,8 +123,8 @@ RULES = (
         "scene",
         "the table has each of its fields",
         Duty.IGNORE,
-        "A stepper SHOULD reject here, because a misspelt law would be taken for an absent one. It need not:"
-        " many JSON libraries drop what they do not know.",
+        "A stepper SHOULD reject here, because a misspelt law would be taken for an absent one. "
+        "It need not: many JSON libraries drop what they do not know.",
         in_schema=True,
     ),
     ProtocolRule(
@@ -136,8 +140,8 @@ RULES = (
         "scene",
         "no optional field of a scene or a law is null",
         Duty.IGNORE,
-        "Many JSON libraries do not tell null from an absent field. Only `wall` may be null in a good"
-        " question.",
+        "Many JSON libraries do not tell null from an absent field. Only `wall` may be null in a "
+        "good question.",
         in_schema=True,
     ),
     ProtocolRule(
@@ -155,7 +159,8 @@ RULES = (
         "law",
         "`omega` > 0 and `period` > 0",
         Duty.REJECT,
-        "With omega = 0 the law has no period. A negative omega is another way to write the same law.",
+        "With omega = 0 the law has no period. A negative omega is another way to write the same "
+        "law.",
         in_schema=True,
     ),
     ProtocolRule(
@@ -163,8 +168,8 @@ RULES = (
         "law",
         f"`cos` and `sin` have at most {MAX_HARMONICS} numbers each",
         Duty.REJECT,
-        "The proof that a scene is valid takes time that grows steeply with their number. A stepper that"
-        " dropped the further ones would answer for another scene.",
+        "The proof that a scene is valid takes time that grows steeply with their number. A "
+        "stepper that dropped the further ones would answer for another scene.",
         in_schema=True,
     ),
     ProtocolRule("knots", "law", f"there are 2 to {MAX_KNOTS} knots", Duty.REJECT, in_schema=True),
@@ -175,8 +180,8 @@ RULES = (
         "law",
         "tn - t0 is a binary64 number, exactly",
         Duty.REJECT,
-        "Otherwise no `period` of another law could equal it. Knots at 0.1, 0.5, 1.1 are refused, because"
-        " 1.1 - 0.1 is no binary64 number.",
+        "Otherwise no `period` of another law could equal it. Knots at 0.1, 0.5, 1.1 are refused, "
+        "because 1.1 - 0.1 is no binary64 number.",
     ),
     ProtocolRule(
         "known-law-fields",
@@ -217,24 +222,25 @@ RULES = (
         "state",
         "the particle is not on two walls at once",
         Duty.NO_NEXT,
-        "In a corner and at the mouth's edge there is no normal, so nothing tells whether a particle moves"
-        " into a wall: this holds whichever way it moves. The reason is corner or mouth-edge.",
+        "In a corner and at the mouth's edge there is no normal, so nothing tells whether a "
+        "particle moves into a wall: this holds whichever way it moves. The reason is corner or "
+        "mouth-edge.",
     ),
     ProtocolRule(
         "lifts-off",
         "state",
         "a particle on a wall leaves it",
         Duty.NO_NEXT,
-        "A particle along its wall has f' = 0 there, and f'' > 0 if it leaves. The reason is sliding, or"
-        " tangency where f'' = 0 on a wall of a moving table.",
+        "A particle along its wall has f' = 0 there, and f'' > 0 if it leaves. The reason is "
+        "sliding, or tangency where f'' = 0 on a wall of a moving table.",
     ),
     ProtocolRule(
         "early",
         "state",
         "abs(t) is less than 2^30 periods, or 2^30 units of time if nothing moves",
         Duty.MAY_REJECT,
-        "A phase so far from time 0 has few correct digits in binary64, before time 0 as well as after it."
-        " Therefore abs(t) counts. The period 2 pi / omega is the exact one.",
+        "A phase so far from time 0 has few correct digits in binary64, before time 0 as well as "
+        "after it. Therefore abs(t) counts. The period 2 pi / omega is the exact one.",
     ),
     ProtocolRule(
         "small",
@@ -276,9 +282,9 @@ RULES = (
         "request",
         "`t_end` > state.t",
         Duty.ARRIVE,
-        "A particle at t_end has arrived, and nothing is asked of its next flight. So this holds also for a"
-        " particle in a corner, at the mouth's edge or along a wall, from which no flight is defined. A state"
-        " that must be rejected is rejected.",
+        "A particle at t_end has arrived, and nothing is asked of its next flight. So this holds "
+        "also for a particle in a corner, at the mouth's edge or along a wall, from which no "
+        "flight is defined. A state that must be rejected is rejected.",
     ),
     ProtocolRule(
         "known-request-fields",
@@ -343,10 +349,10 @@ def is_late(scene: Scene, t: float) -> bool:
 
 
 def without_loose(data: Any) -> tuple[Any, bool]:
-    """Return a scene in the wire's form without the fields that may be ignored, and whether there were any.
+    """Return a scene without the fields that may be ignored, and whether there were any.
 
-    These are unknown fields of a scene or of its laws, optional ones that are null, and texts that may not
-    stand there. Data that are no scene are returned as they are.
+    These are unknown fields of a scene or of its laws, optional ones that are null, and texts that
+    may not stand there. Data that are no scene are returned as they are.
     """
     fields = _fields_of(data, "table", TABLES)
     if not fields:
@@ -362,17 +368,22 @@ def without_loose(data: Any) -> tuple[Any, bool]:
     for name, law in kept.items():
         known = _fields_of(law, "kind", KINDS)
         if known:
-            kept[name] = {
-                field: part
-                for field, part in law.items()
-                if field in known and (part is not None or field not in OPTIONAL)
-            }
+            kept[name] = _without_loose_of(law, known)
             is_loose |= len(kept[name]) < len(law)
     return kept, is_loose
 
 
+def _without_loose_of(law: Mapping[str, Any], known: tuple[str, ...]) -> dict[str, Any]:
+    """Return a law's fields without unknown ones, and without optional ones that are null."""
+    found = {field: part for field, part in law.items() if field in known}
+    return {name: part for name, part in found.items() if not (part is None and name in OPTIONAL)}
+
+
 def _fields_of(data: Any, tag: str, forms: Mapping[str, type[msgspec.Struct]]) -> tuple[str, ...]:
-    """Return the fields that an object may have by its tag; none where it is no object of any form."""
+    """Return the fields that an object may have by its tag.
+
+    None where it is no object of any form.
+    """
     form = (
         forms.get(data[tag])
         if isinstance(data, Mapping) and isinstance(data.get(tag), str)

@@ -1,8 +1,8 @@
 """Protocol 1 for implementations in Python: one JSON object a line on stdin and stdout.
 
-`serve` answers every request with a stepper given as Python functions. A line that cannot be understood is
-answered by `rejected`, with a reason that names the field. A stepper that does not know flight times or walls
-answers `AnsweredCollision` without them.
+`serve` answers every request with a stepper given as Python functions. A line that cannot be
+understood is answered by `rejected`, with a reason that names the field. A stepper that does not
+know flight times or walls answers `AnsweredCollision` without them.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,7 +42,8 @@ Flowing = Callable[[Scene, Sequence[State], float], Sequence[tuple[Outcome, Capt
 Timer = Callable[[Scene, State, int, int], tuple[Sequence[int], Answered | Outcome]]
 
 
-class OwnFailure(Exception):  # noqa: N818 (a failure that is owned to, not an error of this program)
+# A failure that is owned to, not an error of this program.
+class OwnFailure(Exception):  # noqa: N818
     """Raised by a stepper that cannot give an outcome: answered as `error`, with this text."""
 
 
@@ -66,13 +67,14 @@ def serve(
     Args:
         name: of the implementation.
         stepper: (scene, state, t_end) -> outcome in the wire's form.
-        follower: (scene, state, collisions, t_end) -> collisions; the last entry may be another outcome.
+        follower: (scene, state, collisions, t_end) -> collisions; the last entry may be another
+            outcome.
         lines: requests, one JSON object a line.
         out: answers, one line each, flushed.
         flow: (scene, states, t_end) -> for each state its outcome at t_end and (t_in, t_out) of its
             first capture interval, or None; the profile is offered only if this is given.
-        timer: (scene, state, collisions, repeat) -> nanoseconds of each repeat, and the last outcome;
-            likewise.
+        timer: (scene, state, collisions, repeat) -> nanoseconds of each repeat, and the last
+            outcome; likewise.
     """
     _Server(name, stepper, follower, flow, timer).run(lines, out)
 

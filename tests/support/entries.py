@@ -4,18 +4,18 @@ from numba.core.dispatcher import Dispatcher
 
 from fast.kernel import (
     arithmetic,
+    batch,
     fine_step,
     follow,
     lane_laws,
     path,
     scalar_step,
     single,
-    starts,
     worker,
 )
 from fast.kernel.numba_internals import cache_folder
 
-MODULES = (arithmetic, fine_step, follow, lane_laws, path, scalar_step, single, starts, worker)
+MODULES = (arithmetic, fine_step, follow, lane_laws, path, scalar_step, single, batch, worker)
 
 
 def kept_entries() -> list[Dispatcher]:

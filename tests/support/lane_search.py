@@ -14,9 +14,9 @@ import numpy as np
 
 from fast.batch import LaneRound, take_careful_steps
 from fast.kernel import lanes, records, rows
+from fast.kernel.batch import residual
 from fast.kernel.fine_step import FineState, fine_path
 from fast.kernel.records import DEPTH, RATE, FloatArray, Particle
-from fast.kernel.starts import residual
 from scene import Scene
 from support.lane_anywhere import Group, Start, draw_anywhere
 from support.lane_draws import AIMS, draw_aimed

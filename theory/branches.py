@@ -351,6 +351,8 @@ def zone_of(mushroom: PreparedMushroom, t: Floats) -> ChaoticZone:
     """Return the `chaotic_zone` of a mushroom that is prepared, at times (n,)."""
     root, start, period = solve_cycle(mushroom)
     n_before = np.zeros_like(t)
+    if not math.isfinite(period):
+        raise BadInput("the scene's period is beyond binary64: give its laws other units")
     if period:
         n_before = np.floor((t - start) / period)
         t = t - n_before * period

@@ -379,7 +379,8 @@ def features(scene, state, t_end):
     waves = [law for law in moving if isinstance(law, Fourier)]
     legs = [len(law.knots) - 1 for law in moving if isinstance(law, BangBang)]
     knots = [t for law in moving if isinstance(law, BangBang) for t, _ in law.knots]
-    slope, cycle, is_mushroom = found.get("slope"), scene.period, isinstance(scene, Mushroom)
+    slope = getattr(scene, "slope", None)
+    cycle, is_mushroom = scene.period, isinstance(scene, Mushroom)
     lengths = [law.bounds() for name, law in found.items() if name in ("r", "w", "h")]
     longest = max(max(abs(b.lowest), abs(b.highest)) for b in lengths)
     size = max(flight.laws[name].value for name in ("r", "h") if name in flight.laws)

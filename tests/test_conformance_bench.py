@@ -190,6 +190,20 @@ def test_a_solver_that_cannot_be_timed_is_left_out(drawn, why):
     assert solvers.measure(drawn["slow"], [solver], BRIEF, lambda _: None) == ([], {"it": why})
 
 
+def test_a_solver_is_run_on_the_workloads_that_it_serves_alone(drawn):
+    asked = []
+
+    def run(workload, _n_times):
+        asked.append(workload.rule.name)
+        return SolverRun(1.0, [Undecided("")] * 3, 1e9)
+
+    solver = Solver("it", "command", run, ("slow",))
+    assert solvers.measure(drawn["grazing"], [solver], BRIEF, lambda _: None) == ([], {})
+    assert asked == []
+    assert len(measured(drawn["slow"], solver)) == 1
+    assert set(asked) == {"slow"}
+
+
 @pytest.mark.deep
 def test_errors_grow_as_the_jacobians_say():
     followers = ours.our_followers()

@@ -611,3 +611,15 @@ DRAWN = {
 @pytest.mark.parametrize("name", DRAWN)
 def test_a_figure_says_what_it_shows(moving, name):
     assert said(DRAWN[name](moving)) == PICTURES[name]
+
+
+@pytest.mark.parametrize("width", [0.02, 1.0])
+def test_a_panel_of_the_limit_is_as_high_as_its_bars_or_theory(width):
+    """Whichever is higher."""
+    s = np.random.default_rng(1).normal(0.1, width, 400)
+    [axes] = energies.histogram(NAMELESS, 1e6, s).axes
+    curve = xy(line(axes, "theory, captured, at high energies"))[1].max()
+    [errors] = [with_errors(one) for one in axes.containers]
+    top = (errors.y + errors.errors).max()
+    assert (curve > top) == (width > 0.5)
+    assert axes.get_ylim() == (0, pytest.approx(energies.ROOM * max(curve, top)))

@@ -17,7 +17,7 @@ PLACES = {
     "fast/kernel/laws.py": "compiles them",
     "reference/timeline.py": "encloses them",
     "conformance/plain/step.py": "computes them, plainly",
-    "conformance/bench/baselines.py": "lays them out for the engines in C++",
+    "conformance/bench/baselines.py": "lays them out for the engines in C",
 }
 
 

@@ -64,6 +64,7 @@ class Cycle:
     well: NuWell
 
     @classmethod
+    @guarded
     def of(cls, scene: Scene, digits: int) -> Cycle:
         """Analyse a scene's motion.
 

@@ -44,10 +44,8 @@ import numpy.typing as npt
 from mpmath import fp
 
 from scene import BadInput, Horizon, Mushroom, Outcome, Scene, State, Undecided
-from scene.geometry import area, half_width, table_at
-from scene.laws import size_bounds, values
+from scene.geometry import area, table_at
 from scene.protocol.wire import Captured, Flowing
-from scene.tables import laws
 from scene.transforms import backwards
 
 Floats = npt.NDArray[np.float64]
@@ -342,14 +340,15 @@ def margin(n: int, variance: float, bound: float, alarm: float) -> float:
 
 def least_ratio(scene: Scene) -> float:
     """Return the product of (least / greatest)^2 over the lengths of the table."""
-    found = [size_bounds(law) for name, law in laws(scene).items() if name in ("r", "w", "h")]
+    found = [law.size_bounds() for name, law in scene.laws.items() if name in ("r", "w", "h")]
     return prod((law.lowest / law.highest) ** 2 for law in found)
 
 
 def least_nu(scene: Mushroom, span: float) -> float:
     """Return the instant of least nu as a fraction of the period; of a plateau the middle."""
     parts = np.arange(4096) / 4096
-    nu = half_width(fp, scene, span * parts) / values(scene.r, span * parts)
+    times = span * parts
+    nu = scene.width.values(times) / scene.laws["r"].values(times)
     low = parts[nu <= nu.min() * (1 + 2.0**-40)]
     return float(low[0] + low[-1]) / 2
 
@@ -381,7 +380,7 @@ def _states(scene: Scene, v: Floats, random: np.random.Generator) -> list[State]
 
 def _is_captured(scene: Mushroom, at: Horizon) -> bool:
     spin = abs(at.x * at.vy - at.y * at.vx)
-    return at.y > 0 and spin > half_width(fp, scene, at.t) * sqrt(2 * _energy(at))
+    return at.y > 0 and spin > scene.width.value(fp, at.t) * sqrt(2 * _energy(at))
 
 
 def _energy(at: State | Horizon) -> float:

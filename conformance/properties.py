@@ -53,11 +53,10 @@ from scene import (
     transforms,
 )
 from scene.geometry import table_at
-from scene.laws import bounds, is_constant, times_power
+from scene.laws import times_power
 from scene.precision import decimals
 from scene.refusal import shown
 from scene.states import Stepper
-from scene.tables import laws, period
 
 BOUND = 1e-9
 SLACK = 4.0  # first-order errors of two answers, each estimated by differences
@@ -147,7 +146,8 @@ def check_period_shift(
     The shifted times are rounded. This error is known and counts as an error of t. With `is_exact` bits
     must be equal if nothing is rounded. See `check_mirror`.
     """
-    shared, answer = period(scene), ask(stepper, scene, state, t_end)
+    shared = scene.cycle
+    answer = ask(stepper, scene, state, t_end)
     if shared is None or not isinstance(answer, Collision | Horizon):
         return False
     ctx = decimals(50)
@@ -265,7 +265,7 @@ def check_energy(stepper: Stepper, scene: Scene, state: State, t_end: float, *, 
     """Check that the speed is constant in a static table."""
     answer = ask(stepper, scene, state, t_end)
     found = numbers(answer, state)
-    if found is None or not all(is_constant(law) for law in laws(scene).values()):
+    if found is None or scene.cycle is not None:
         return False
     before, after = hypot(state.vx, state.vy), hypot(*found[4:])
     if not abs(after - before) <= SLACK * bound * before:
@@ -421,7 +421,7 @@ def fail(name: str, text: str, *questions: Question) -> NoReturn:
 
 def is_clearly_inside(scene: Scene, state: State, t_end: float) -> bool:
     """Tell whether a state is one that no stepper may refuse; of one on a wall this does not judge."""
-    sizes = [abs(extent) for law in laws(scene).values() for extent in bounds(law)]
+    sizes = [abs(extent) for law in scene.laws.values() for extent in law.bounds()]
     sizes += [abs(number) for number in (state.x, state.y, state.vx, state.vy, state.t, t_end)]
     is_far = max(abs(state.t), abs(t_end)) > FAR * (scene.period or 1.0)
     if state.wall is not None or is_far or any(size and not 1 / HELD < size < HELD for size in sizes):
@@ -480,7 +480,7 @@ class MeasuredStep(NamedTuple):
 
 def scales(scene: Scene, state: State) -> tuple[float, float, float]:
     """Return the table's size [length], the speed [length/time], and the time that a crossing takes."""
-    found = {name: bounds(law) for name, law in laws(scene).items()}
+    found = {name: law.bounds() for name, law in scene.laws.items()}
     length = max(law.highest for name, law in found.items() if name in ("r", "w", "h"))
     speed = hypot(state.vx, state.vy) or max(law.slope for law in found.values()) or length
     return length, speed, length / speed

@@ -182,14 +182,6 @@ class TableAt(NamedTuple):
         return lines
 
 
-def half_width(ctx: Any, scene: Scene, t: Any) -> Any:
-    """Return the half width w(t), given as w or as nu r [length]; 0 in a cap.
-
-    With `fp` t may be an array of times.
-    """
-    return scene.width.value(ctx, t)
-
-
 def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
     """Evaluate a table at time t in mpmath's `fp` or in numbers of `scene.precision.decimals`.
 

@@ -167,25 +167,6 @@ def check_scene(scene: object) -> None:
     raise BadInput(f"scene = {shown(scene)}, must be a Cap, a Stem or a Mushroom{hint}")
 
 
-def laws(scene: Scene) -> dict[str, GivenLaw]:
-    """Return the laws as the scene gives them, by parameter name."""
-    found = ((name, getattr(scene, name, None)) for name in PARAMETERS)
-    return {name: law for name, law in found if law is not None}
-
-
-def width_factors(scene: Stem | Mushroom) -> tuple[GivenLaw, ...]:
-    """Return the laws whose product is the half-width w(t) of the mouth: (w,) or (nu, r)."""
-    if isinstance(scene, Mushroom) and scene.nu is not None:
-        return (scene.nu, scene.r)
-    assert scene.w is not None
-    return (scene.w,)
-
-
-def period(scene: Scene) -> Period | None:
-    """Return the period that all moving laws of a scene share; None for a static table."""
-    return scene.cycle
-
-
 @lru_cache(maxsize=4096)
 def _prove(table: type[_Table], given: tuple[GivenLaw | None, ...]) -> None:
     # Cached by value: -0.0 and 0.0 count as equal, and validity is a matter of real numbers. A

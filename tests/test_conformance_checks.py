@@ -31,7 +31,6 @@ from conformance.suite.session import Session
 from conformance.vectors import Vector, question
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, from_data, load
 from scene.geometry import area, table_at
-from scene.laws import bounds
 from scene.protocol.messages import Introduction
 from theory import predict
 
@@ -58,7 +57,7 @@ def test_one_number_is_drawn_from_each_octave(low, high):
 @pytest.mark.parametrize(("bound", "far"), [(0.5, 1.5), (1.5, 0.5), (0.0, 1.0), (1.25, 0.75)])
 def test_a_law_that_is_broken_for_a_while_keeps_to_its_values(make, off, bound, far):
     """It passes its bound, or stays short of it, by little; elsewhere it reaches what was asked for."""
-    law = bounds(msgspec.convert(make(bound, far, share=0.01, at=0.25, off=off), Fourier | BangBang))
+    law = msgspec.convert(make(bound, far, share=0.01, at=0.25, off=off), Fourier | BangBang).bounds()
     near, most = (law.lowest, law.highest) if bound < far else (law.highest, law.lowest)
     assert most == pytest.approx(far, abs=0.01 * abs(far - bound))
     past = (bound - near) * (1.0 if bound < far else -1.0) * off

@@ -46,10 +46,21 @@ from conformance.suite.run import Transform, draw_transform
 from conformance.verify import Verdict, verify_line
 from fast import paths
 from fast.__main__ import carry, follow
-from scene import BadInput, BangBang, Cap, Fourier, Horizon, Mushroom, Rejected, State, Undecided, from_data
+from scene import (
+    BadInput,
+    BangBang,
+    Cap,
+    Constant,
+    Fourier,
+    Horizon,
+    Mushroom,
+    Rejected,
+    State,
+    Undecided,
+    from_data,
+)
 from scene.laws import MAX_KNOTS
 from scene.protocol.rules import may_be_refused
-from scene.tables import laws, period
 
 # The fault, and the row of the table of families whose questions it answers wrong; none for a run's first.
 FAULTS: dict[str, tuple[Mutant, str]] = {
@@ -124,7 +135,7 @@ def past_standing_walls(flight, plain, wall, start, end):
     """Looks for the hit of a particle 2^20 times as fast as walls as if these stood still."""
     moving = flight.laws
     if 0.0 < 2.0**20 * walls_speed(flight.scene) < hypot(flight.vx, flight.vy):
-        flight.laws = {name: ConstantMotion(law.at(0.0).value, 0.0) for name, law in moving.items()}
+        flight.laws = {name: ConstantMotion(Constant(law.at(0.0).value), 0.0) for name, law in moving.items()}
     found = plain(wall, start, end)
     flight.laws = moving
     return found
@@ -147,7 +158,7 @@ def no_base_in_the_mouth(flight, plain):
 @fault("omega of the first", "anywhere-mushroom-floor", "law")
 def omega_of_the_first(flight, plain, law):
     """Takes omega of the first wave of a scene for all: one that stands still may have any."""
-    waves = [other for other in laws(flight.scene).values() if isinstance(other, Fourier)]
+    waves = [other for other in flight.scene.laws.values() if isinstance(other, Fourier)]
     if isinstance(law, Fourier):
         law = msgspec.structs.replace(law, omega=waves[0].omega, period=waves[0].period)
     return plain(law)
@@ -158,15 +169,15 @@ def waves_from_the_first_knot(flight, plain, law):
     """Counts the time of every law from the first knot of any."""
     if not isinstance(law, Fourier):
         return plain(law)
-    knots = [other.knots for other in laws(flight.scene).values() if isinstance(other, BangBang)]
-    return flight.kinds[Fourier](law, flight.state.t - (knots[0][0][0] if knots else 0.0))
+    knots = [other.knots for other in flight.scene.laws.values() if isinstance(other, BangBang)]
+    return flight.motion(law, flight.state.t - (knots[0][0][0] if knots else 0.0))
 
 
 @fault("late phase in float32", "returning-stem-left", "law")
 def late_phase_in_float32(flight, plain, law):
     """Keeps the time of departure in binary32 from a hundred thousand on."""
     t = flight.state.t
-    return flight.kinds[type(law)](law, single(t) if abs(t) > 1e5 else t)
+    return flight.motion(law, single(t) if abs(t) > 1e5 else t)
 
 
 @fault("captured cannot leave", "changed-mouth-right", "is_mouth_open")
@@ -179,7 +190,7 @@ def captured_cannot_leave(flight, plain, s):
 
 def family_of_laws(scene):
     """Return what a law is in a scene, and its numbers in proportion: the same in all its images."""
-    return json.dumps([sorted(laws(scene)), *(_proportions(law) for law in laws(scene).values())])
+    return json.dumps([sorted(scene.laws), *(_proportions(law.as_field()) for law in scene.laws.values())])
 
 
 def _proportions(law):
@@ -214,7 +225,7 @@ def is_straight(flight, wall):
 
 def is_early(flight, _):
     """Tell whether a flight begins before time 0, between waves."""
-    return flight.state.t < 0 and Fourier in map(type, laws(flight.scene).values())
+    return flight.state.t < 0 and Fourier in map(type, flight.scene.laws.values())
 
 
 def is_unknown(flight, _):
@@ -334,7 +345,7 @@ def test_hundreds_of_draws_that_are_none_end_no_run():
 def test_laws_have_as_many_legs_as_there_may_be():
     assert len(many_legs(Draw("legs"), 1.0, 2.0, 1.5, MAX_KNOTS - 1).knots) == MAX_KNOTS
     for number in (1, 2):
-        found = laws(from_data(asked_of("many-knots-stem", number).scene)).values()
+        found = from_data(asked_of("many-knots-stem", number).scene).laws.values()
         assert max(len(law.knots) for law in found if isinstance(law, BangBang)) == MAX_KNOTS
 
 
@@ -432,7 +443,7 @@ def test_no_question_becomes_one_that_may_be_refused(corpus):
     """In a table at rest lateness counts units of time, which a transform changes."""
     n_late, n_scaled = 0, 0
     valid = ((v, from_data(v.scene)) for v in corpus if v.expect[0].outcome != "rejected")
-    for vector, scene in ((v, scene) for v, scene in valid if period(scene) is None):
+    for vector, scene in ((v, scene) for v, scene in valid if scene.cycle is None):
         for seed in range(3):
             worn = draw_transform(vector, seed)
             image, is_late = worn.apply(vector), may_be_refused(scene, vector.state)

@@ -37,7 +37,7 @@ from scene import (
     from_data,
     load,
 )
-from scene.laws import value
+from scene.laws import law_of
 from scene.states import ON_WALL
 
 N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "200"))  # MUSHROOMS_STEPS=20000 for the whole
@@ -168,8 +168,8 @@ DROP = Stem(w=1.0, h=BangBang(knots=((-1.0, 1.0), (0.125, 1.0), (1.125, 0.75), (
 @pytest.mark.parametrize("law", [LIFT.h, Fourier(mean=1.0, omega=2.0, cos=(0.25, 0.125), sin=(0.5,))])
 def test_a_law_rises_by_what_its_values_do(law, t, s):
     """A difference of two values would lose all digits of a rise in a short time."""
-    seen = plain.Flight.kinds[type(law)](law, t).at(s)
-    then, rise = (value(CTX, law, CTX.mpf(t) + CTX.mpf(later)) for later in (0.0, s))
+    seen = plain.Flight.motion(law_of(law), t).at(s)
+    then, rise = (law_of(law).value(CTX, CTX.mpf(t) + CTX.mpf(later)) for later in (0.0, s))
     assert seen.rise == pytest.approx(float(rise - then), rel=1e-11, abs=1e-15 * s)
 
 

@@ -54,9 +54,8 @@ from scene import (
     transforms,
 )
 from scene.geometry import rounded
-from scene.laws import bounds, is_constant, size_bounds, values
+from scene.laws import law_of
 from scene.states import check_numbers
-from scene.tables import laws as laws_of, period
 
 N_QUESTIONS = 40
 HONEST = {"plain": plain.next_collision, "fast": fast.next_collision}
@@ -76,7 +75,7 @@ def test_honest_steppers_hold(stepper, name, tally):
     table = "cap" if name == "angular-momentum" else None
 
     def is_fit(drawn):
-        return moves is None or moves == (period(drawn[0]) is not None)
+        return moves is None or moves == (drawn[0].cycle is not None)
 
     @settings(max_examples=N_QUESTIONS)
     @given(scenes_and_states(table).filter(is_fit))
@@ -125,7 +124,7 @@ def test_the_reference_holds(question):
 
 def separate_path_for_moving_walls(scene, state, t_end):
     found = plain.next_collision(scene, state, t_end)
-    is_still = all(isinstance(law, float) for law in laws_of(scene).values())
+    is_still = all(isinstance(law.as_field(), float) for law in scene.laws.values())
     return (
         found if is_still or not isinstance(found, Collision) else replace(found, dt=found.dt * (1 + 1e-15))
     )
@@ -348,11 +347,11 @@ def test_states_of_a_given_scene_are_sound(name, data):
 
 @given(st.floats(-4.0, 4.0), st.floats(0.0, 4.0), st.data())
 def test_laws_stay_in_their_range(low, width, data):
-    law = data.draw(laws(low, low + width))
+    law = law_of(data.draw(laws(low, low + width)))
     slack = 2.0**-45 * (abs(low) + width)
-    told = bounds(law)
+    told = law.bounds()
     if low > 0.0 and not told.lowest >= low - slack:  # waves that add up to more than the mean
-        reached = values(law, 2 * math.pi / law.omega * np.arange(512) / 512)
+        reached = law.values(2 * math.pi / law.omega * np.arange(512) / 512)
         told = told._replace(lowest=reached.min(), highest=reached.max())
     assert told.lowest >= low - slack
     assert told.highest <= low + width + slack
@@ -362,7 +361,8 @@ def test_some_waves_add_up_to_more_than_the_mean(tally):
     @settings(max_examples=300)
     @given(laws(0.1, 2.0, Clock("fourier", 1.0)))
     def draw(law):
-        tally["deep"] += bounds(law).lowest < 0.0 < size_bounds(law).lowest
+        law = law_of(law)
+        tally["deep"] += law.bounds().lowest < 0.0 < law.size_bounds().lowest
 
     draw()
     assert tally["deep"] > 5
@@ -374,13 +374,14 @@ N_DRAWN = N_SESSIONS * N_EACH
 
 def features(scene, state, t_end):
     """Name what tables and laws there are, what a state is near to, how it flies, and when."""
-    found, flight = laws_of(scene), Flight(scene, state, t_end)
-    moving = [law for law in found.values() if not is_constant(law)]
+    found, flight = scene.laws, Flight(scene, state, t_end)
+    moving = [law for law in found.values() if not law.is_constant]
     waves = [law for law in moving if isinstance(law, Fourier)]
     legs = [len(law.knots) - 1 for law in moving if isinstance(law, BangBang)]
     knots = [t for law in moving if isinstance(law, BangBang) for t, _ in law.knots]
-    slope, cycle, is_mushroom = found.get("slope"), scene.period, isinstance(scene, Mushroom)
-    lengths = [bounds(law) for name, law in found.items() if name in ("r", "w", "h")]
+    slope = getattr(scene, "slope", None)
+    cycle, is_mushroom = scene.period, isinstance(scene, Mushroom)
+    lengths = [law.bounds() for name, law in found.items() if name in ("r", "w", "h")]
     longest = max(max(abs(b.lowest), abs(b.highest)) for b in lengths)
     size = max(flight.laws[name].value for name in ("r", "h") if name in flight.laws)
     around = [w for w in flight.walls_near(in_cap=flight.is_in_cap) if w != state.wall]
@@ -464,7 +465,7 @@ def test_every_family_is_reached(name):
 
 
 BLIND = {
-    "to a floor that moves": lambda of, hit: hit.wall == "floor" and not is_constant(of.h),
+    "to a floor that moves": lambda of, hit: hit.wall == "floor" and not of.laws["h"].is_constant,
     "to a mushroom's base": lambda of, hit: hit.wall == "base" and isinstance(of, Mushroom),
 }
 

@@ -22,9 +22,7 @@ from support.forged_claims import KINDS, REFUSALS, draw, judge, lines, plain, po
 from conformance import verify
 from conformance.vectors import certified
 from scene import from_data
-from scene.laws import value
 from scene.precision import decimals
-from scene.tables import laws
 
 N_CASES = int(os.environ.get("MUSHROOMS_INTERVALS", 1_500))
 N_FORGERIES = int(os.environ.get("MUSHROOMS_FORGERIES", 66))
@@ -85,14 +83,14 @@ def check_law(random: Random, bits: int) -> None:
         Fraction(line["state"]["t"]),
         decimals(DECIMALS),
     )
-    name, law = random.choice(list(laws(from_data(line["scene"])).items()))
+    name, law = random.choice(list(from_data(line["scene"]).laws.items()))
     begin = Fraction(random.getrandbits(40), 2**36)
     length = Fraction(random.getrandbits(20), 2 ** random.randint(16, 200)) * random.randint(0, 1)
     stretch = verify.join(verify.number(begin, bits), verify.number(begin + length, bits))
     jet = verify.law_jet(scene.laws[name], verify.Clock(scene, t, bits), stretch)
     point = t + begin + length * random.choice((0, 1, Fraction(1, 4)))
     at = mp.mpf(point.numerator) / point.denominator
-    ratios = [value(mp, law, at, order).as_integer_ratio() for order in (0, 1, 2)]
+    ratios = [law.value(mp, at, order).as_integer_ratio() for order in (0, 1, 2)]
     for interval, ratio in zip(jet, ratios, strict=True):
         (low, high), number = interval.ends, Fraction(*map(int, ratio))
         around = (1 + abs(number)) / Fraction(10) ** 230

@@ -47,9 +47,8 @@ from mushrooms.store import conduct
 from mushrooms.store.spec import FIELDS, RunSpec, Shape, shape_of
 from reference.arithmetic import MAX_WORK
 from scene import BadInput, from_data, load
-from scene.laws import MAX_HARMONICS, MAX_KNOTS, value
+from scene.laws import MAX_HARMONICS, MAX_KNOTS
 from scene.load import catalogue, catalogue_text
-from scene.tables import laws
 from theory.distribution import loss_probability
 
 ROOT = Path(__file__).parent.parent
@@ -344,7 +343,7 @@ def test_the_scenes_of_the_scene_page_are_what_it_says(tmp_path):
             continue
         table = load(tmp_path / name)
         assert load(as_json) == table
-        shown.update([type(table).__name__, *(type(law).__name__ for law in laws(table).values())])
+        shown.update([type(table).__name__, *(type(law.as_field()).__name__ for law in table.laws.values())])
     assert set(shown) == {"Cap", "Stem", "Mushroom", "float", "Fourier", "BangBang"}
     assert len(refusals) == 1
 
@@ -506,7 +505,7 @@ def sentence_of_the_knots() -> str:
     r = from_data(tomllib.loads(page.split("```toml bang-bang.toml")[1].split("```")[0])).r
     (start, first), (end, second) = r.knots[:2]
     linear = (3 * first + second) / 4
-    return f"at {(t := start + (end - start) / 4)} the value is {value(fp, r, t)}, not {linear}"
+    return f"at {(t := start + (end - start) / 4)} the value is {r.value(fp, t)}, not {linear}"
 
 
 def row_of_losses(name: str, label: str) -> str:

@@ -1,7 +1,7 @@
 """The fast step: what it does not guess or got wrong once, that it answers as a path does; sizes near 0.
 
 Waves may cancel to a part of 1e-4 to 1e-13, and terms known to 2^-62 of themselves would not do. Waves that
-add up to more than their mean may leave a size that is positive all the same; `scene.laws.bounds` says of it
+add up to more than their mean may leave a size that is positive all the same; `Law.bounds` says of it
 that it may be negative. A bound below 0 must not be squared, divided by or multiplied by another.
 """
 

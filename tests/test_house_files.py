@@ -28,7 +28,7 @@ MAX_STATEMENTS = {
     "scene": 1_980,
     "reference": 1_450,
     "fast": 3_728,
-    "theory": 2_147,
+    "theory": 2_220,
     "conformance": 8_079,
     "mushrooms": 6_012,
     "docs": 242,

@@ -1,5 +1,6 @@
 """Secs. 3.2 to 3.5: falls and rises of nu, capture and release; several captures a cycle, identities."""
 
+import dataclasses
 import importlib
 import re
 from fractions import Fraction
@@ -14,12 +15,13 @@ from mpmath import MPContext
 from numpy.typing import NDArray
 from support.depth import deep_but
 
-from scene import BangBang, Fourier, InvalidScene, Mushroom, load
-from scene.laws import value
+from scene import BangBang, Constant, Fourier, InvalidScene, Law, Mushroom, load
+from scene.pieces import Period, PolynomialPiece
 from scene.transforms import scaled
 from theory import (
     Cycle,
     Energies,
+    NotCovered,
     capture_curve,
     capture_time_mass,
     chaotic_zone,
@@ -32,6 +34,7 @@ from theory import (
 from theory.adiabatic import captures
 from theory.critical import solve_rising, spans
 from theory.cycle import MovingMushroom, NuWell
+from theory.prepared import prepare
 
 
 def test_moving_cap_releases_at_two_pi_minus_t() -> None:
@@ -53,7 +56,7 @@ def test_degenerate_turns_are_found_with_their_orders() -> None:
     for cos, orders in (([0.25, 0.0625], [4, 2]), ([0.28125, 0.0, 0.09375], [3, 2, 3, 2])):
         law = Fourier(mean=0.5, omega=1.0, cos=tuple(cos))
         ctx = MPContext()
-        found = spans(ctx, Mushroom(r=1.0, h=1.0, nu=law))
+        found = spans(ctx, prepare(Mushroom(r=1.0, h=1.0, nu=law)))
         assert sorted(s.start_order for s in found) == sorted(orders)
 
 
@@ -99,12 +102,37 @@ def test_width_over_radius_is_the_same_cycle_as_nu(length: int) -> None:
         assert abs(by_w.t_out(ctx.mpf(nu)) - by_nu.t_out(ctx.mpf(nu))) < ctx.mpf(10) ** -45
 
 
+class Cubic(Law, frozen=True):
+    """A law of a kind that there is not: 1 + t^3 for a time 2."""
+
+    cycle = Period(None, Fraction(2))
+    is_polynomial = True
+
+    def breakpoints(self) -> list[Fraction]:
+        """Return both ends."""
+        return [Fraction(0), Fraction(2)]
+
+    def piece_at(self, time: Fraction) -> PolynomialPiece:
+        """Return the first piece."""
+        coefficients = tuple(map(Fraction, (1, 0, 0, 1)))
+        return PolynomialPiece(Fraction(0), coefficients, Fraction(2))
+
+
+def test_a_cubic_over_a_parabola_is_not_covered() -> None:
+    ramp = BangBang(knots=((0.0, 0.5), (1.0, 0.75), (2.0, 0.5)))
+    plain = prepare(Mushroom(r=1.0, h=1.0, nu=ramp))
+    cubic = dataclasses.replace(plain, mouth=(Cubic(), Constant(1.0)), jointed=(Cubic(),))
+    assert len(spans(MPContext(), cubic)) == 1
+    with pytest.raises(NotCovered, match="a cubic at most"):
+        spans(MPContext(), dataclasses.replace(cubic, mouth=(Cubic(), ramp)))
+
+
 def test_bang_bang_width_and_radius_turn_between_knots() -> None:
     # w and r both move in the leg [0, 1]; dense sampling finds the same extremes.
     w = BangBang(knots=((0.0, 0.5), (1.0, 0.75), (3.0, 0.5)))
     r = BangBang(knots=((0.0, 1.0), (2.0, 1.5), (3.0, 1.0)))
     cycle = Cycle.of(Mushroom(r=r, h=1.0, w=w), 15)
-    sampled = [value(cycle.ctx, w, k / 512) / value(cycle.ctx, r, k / 512) for k in range(1536)]
+    sampled = [w.value(cycle.ctx, k / 512) / r.value(cycle.ctx, k / 512) for k in range(1536)]
     assert max(sampled) <= cycle.nu_max < max(sampled) + 1e-4
     assert min(sampled) - 1e-4 < cycle.nu_min <= min(sampled)
 
@@ -137,11 +165,11 @@ def test_waves_are_summed_to_their_last_bits(size: float, digits: int) -> None:
     finer = MPContext()
     ctx.dps = digits
     finer.dps = digits + 400
-    motion = MovingMushroom(ctx, Mushroom(r=1.0, h=1.0, nu=law), Fraction(0))
+    motion = MovingMushroom(ctx, prepare(Mushroom(r=1.0, h=1.0, nu=law)), Fraction(0))
     for t in draw.uniform(0, 3, 5).tolist():
         nu, rate = (finer.mpf(x) for x in motion.nu(ctx.mpf(t)))
-        assert abs(nu - value(finer, law, finer.mpf(t))) < finer.mpf(10) ** -(digits - 1)
-        assert abs(rate - value(finer, law, finer.mpf(t), 1)) < size * finer.mpf(10) ** -(digits - 2)
+        assert abs(nu - law.value(finer, finer.mpf(t))) < finer.mpf(10) ** -(digits - 1)
+        assert abs(rate - law.value(finer, finer.mpf(t), 1)) < size * finer.mpf(10) ** -(digits - 2)
 
 
 def test_a_root_is_found_where_newton_alone_runs_away() -> None:

@@ -4,6 +4,7 @@ Frozen rates are those of one cycle, however it is written, and of no other (the
 """
 
 import math
+from collections.abc import Iterator
 
 import msgspec
 import numpy as np
@@ -13,9 +14,8 @@ from scipy.stats import ncx2, norm
 from support.depth import deep_among, deep_but
 
 import theory
-from scene import BangBang, Fourier, Mushroom, load
+from scene import BangBang, Fourier, Mushroom, Scene, load
 from scene.geometry import table_at
-from scene.tables import laws
 from scene.transforms import backwards
 from theory import NotCovered, cumulants
 from theory.finite_energy import rates
@@ -27,10 +27,13 @@ from theory.finite_energy.rates import (
     PHASES,
     SPEEDS,
     Fields,
+    MeasuredRates,
+    find_rates,
     frozen_rates,
     kick_rates,
     rates_at,
 )
+from theory.prepared import PreparedMushroom, prepare
 
 CYCLES = (
     "fixed-cap-anticlockwise",
@@ -39,6 +42,11 @@ CYCLES = (
     "moving-cap-reversed",
     "retraced-arc",
 )
+
+
+def known_rates(scene: Scene) -> MeasuredRates:
+    """Return the rates that are known for a scene."""
+    return find_rates(prepare(scene))
 
 
 @pytest.mark.parametrize("variance", [1e-4, 0.003, 0.03, 0.1])
@@ -134,8 +142,8 @@ def test_reversed_cycles_turn_the_lags_and_keep_the_diffusion() -> None:
     forward = load("fixed-cap-anticlockwise")
     backward = load("fixed-cap-clockwise")
     t = np.array([0.06, 0.125, 0.2, 0.3, 0.45, 0.55, 0.7, 0.9])
-    a = rates_at(forward, t)
-    b = rates_at(backward, 1 - t)
+    a = rates_at(known_rates(forward), t)
+    b = rates_at(known_rates(backward), 1 - t)
     assert np.allclose(a.diffusion, b.diffusion)
     assert np.allclose(a.lag, -b.lag)
     assert np.allclose(a.square, b.square)
@@ -244,15 +252,11 @@ def all_at(scene: Mushroom, phases: np.ndarray) -> np.ndarray:
     return np.concatenate([np.ravel(getattr(now, name)) for name in ("r", "w", "h", "slope")])
 
 
-def by_every_fifth_phase(measured: Mushroom, sought: Mushroom) -> bool:
+def by_every_fifth_phase(measured: PreparedMushroom, sought: PreparedMushroom) -> bool:
     """Compare cycles as was done once: at 13 times, without rates."""
-    lengths = [2 * math.pi if isinstance(scene.nu, Fourier) else 1.0 for scene in (measured, sought)]
-    one, other = (
-        all_at(scene, length * PHASES[::5]) for scene, length in zip((measured, sought), lengths, strict=True)
-    )
-    return (
-        lengths[0] == lengths[1] and one.shape == other.shape and np.allclose(one, other, rtol=1e-9, atol=0.0)
-    )
+    one, other = (all_at(each.given, each.period * PHASES[::5]) for each in (measured, sought))
+    is_as_long = measured.period == sought.period
+    return is_as_long and one.shape == other.shape and np.allclose(one, other, rtol=1e-9, atol=0.0)
 
 
 def that_swings_between_phases() -> Mushroom:
@@ -281,6 +285,15 @@ def that_jolts_between_phases() -> Mushroom:
     return msgspec.structs.replace(load("fixed-cap-clockwise"), h=BangBang(knots))
 
 
+@pytest.fixture
+def forgotten() -> Iterator[None]:
+    """Forget which rates were found, for a test that changes how they are found."""
+    find_rates.cache_clear()
+    yield
+    find_rates.cache_clear()
+
+
+@pytest.mark.usefixtures("forgotten")
 @pytest.mark.parametrize("other", [that_swings_between_phases, that_jolts_between_phases])
 def test_a_cycle_that_is_like_a_measured_one_at_phases_is_another(other, monkeypatch):
     """These were given the measured cycle's rates."""
@@ -312,7 +325,7 @@ def later(law):
 @pytest.mark.parametrize("written", [padded, later])
 def test_a_measured_cycle_is_known_however_it_is_written(name, written):
     scene = load(name)
-    again = Mushroom(**{field: written(law) for field, law in laws(scene).items()})
+    again = Mushroom(**{field: written(getattr(scene, field)) for field in scene.laws})
     assert frozen_rates(again)[0] is frozen_rates(scene)[0]
     assert frozen_rates(backwards(again))[0] is frozen_rates(scene)[0]
 
@@ -331,13 +344,14 @@ def test_a_mouth_given_by_its_width_has_the_same_rates(name, monkeypatch):
     times = np.linspace(0.1, 6.1, 13)
     for one, other in ((scene, again), (backwards(scene), backwards(again))):
         assert frozen_rates(other)[0] is frozen_rates(one)[0]
-        for mine, its in zip(rates.rates_at(one, times), rates.rates_at(other, times), strict=True):
+        known, found = known_rates(one), known_rates(other)
+        for mine, its in zip(rates_at(known, times), rates_at(found, times), strict=True):
             np.testing.assert_allclose(its, mine, rtol=1e-9, atol=1e-9)
-        assert rates.table_error(other) == pytest.approx(rates.table_error(one), rel=1e-9)
-    wanted = rates.rates_at(scene, times).diffusion.sum(axis=1)
+        assert rates.table_error(found) == pytest.approx(rates.table_error(known), rel=1e-9)
+    wanted = rates_at(known_rates(scene), times).diffusion.sum(axis=1)
     own = rates.pace
     monkeypatch.setattr(rates, "pace", lambda _, at: own(again, at))  # as was done once
-    assert np.abs(rates.rates_at(again, times).diffusion.sum(axis=1) / wanted - 1).max() > 0.5
+    assert np.abs(rates_at(known_rates(again), times).diffusion.sum(axis=1) / wanted - 1).max() > 0.5
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "ergodic"])

@@ -12,7 +12,6 @@ from support.depth import deep_among, deep_but
 
 import theory
 from scene import BangBang, Fourier, Mushroom, exact, load
-from scene.laws import value, values
 from theory import (
     Cycle,
     NotConverged,
@@ -118,18 +117,17 @@ def quadrature(ctx: Any, a: Any, b: Any, slope: Any, interval: list[Any]) -> dic
 
 def even_quadrature(ctx: Any, scene: Mushroom) -> dict[str, Any]:
     """Sec. 4.2 as it should be printed, of a mouth that is even in time: t_r = 2 pi - t."""
-    pi, nu = ctx.pi, scene.nu
-    assert nu is not None
+    pi, nu = ctx.pi, scene.laws["nu"]
 
     def ratio(t: Any) -> Any:
-        r, h, mouth = (value(ctx, law, t) for law in (scene.r, scene.h, nu))
+        r, h, mouth = (scene.laws[name].value(ctx, t) for name in ("r", "h", "nu"))
         cap = pi**2 * r**2
-        stem = 2 * pi * (2 * mouth * r * h - h**2 * value(ctx, scene.slope, t))
+        stem = 2 * pi * (2 * mouth * r * h - h**2 * scene.laws["slope"].value(ctx, t))
         share = 2 / pi * (ctx.acos(mouth) - mouth * ctx.sqrt(1 - mouth**2))
         return cap / (cap + stem - share * cap)
 
     def slope(t: Any) -> Any:
-        return -4 / pi * ctx.sqrt(1 - value(ctx, nu, t) ** 2) * value(ctx, nu, t, 1)
+        return -4 / pi * ctx.sqrt(1 - nu.value(ctx, t) ** 2) * nu.value(ctx, t, 1)
 
     return quadrature(ctx, ratio, lambda t: ratio(2 * pi - t), slope, [0, pi / 2, pi])
 
@@ -272,7 +270,7 @@ def test_values_of_nu_as_near_as_binary64_tells_them_apart_are_resolved(
 ) -> None:
     cycle = Cycle.of(BESIDE_A_KNOT, 1)
     t = np.linspace(0.0, 2.0, 1_001)
-    nu, h = values(BESIDE_A_KNOT.nu, t), values(BESIDE_A_KNOT.h, t)
+    nu, h = (BESIDE_A_KNOT.laws[name].values(t) for name in ("nu", "h"))
     delta = (2 / np.pi) * (np.arccos(nu) - nu * np.sqrt(1 - nu**2))
     ratio = np.pi / (np.pi * (1 - delta) + 4 * nu * h)
     p_nc = math.exp(-np.trapezoid(ratio, delta))

@@ -183,6 +183,7 @@ BOTH_KINDS = Mushroom(
     r=Fourier(1.5, period=1.0, sin=(0.25,)), w=BangBang(((0.0, 1.0), (0.5, 0.5), (1.0, 1.0))), h=1.0
 )
 UNMEASURED = Mushroom(r=Fourier(1.0, 1.0, (), (0.5,)), h=Fourier(1.0, 1.0, (), (-0.5,)), nu=0.9, slope=0.1111)
+SLOWEST = Mushroom(r=1.0, h=1.0, nu=Fourier(0.5, 1e-320, cos=(0.1,)))
 ONES = [1.0, 1.0]
 at_rest = cache(lambda: theory.at_energy(load("ergodic"), 1e6))
 # What is asked, and what the refusal says.
@@ -223,6 +224,8 @@ REFUSALS = [
     (lambda: theory.Sum(SCENE, 2), "root = "),
     (lambda: theory.sum_of_cycles(energies(), 3, q=1e6), "q = 1000000.0, must be within"),
     (lambda: theory.chaotic_zone(SCENE, 0.0), "times has 0 dimensions, must have 1"),
+    (lambda: theory.chaotic_zone(SLOWEST, [0.0, 1.0]), "period is beyond binary64"),
+    (lambda: theory.upright_spread(SLOWEST), "period is beyond binary64"),
     (lambda: theory.energy_density(SCENE, [[0.0, 1.0]]), "edges has 2 dimensions, must have 1"),
     *(
         (lambda edges=edges: theory.capture_time_mass(SCENE, edges), "edges must be at least two rising")

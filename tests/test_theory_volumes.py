@@ -10,7 +10,6 @@ from mpmath import MPContext, fp
 
 import fast
 from scene import BadInput, Fourier, Horizon, Mushroom, State, load
-from scene.laws import value
 from theory import (
     cap_invariant,
     capture_curve,
@@ -153,7 +152,7 @@ BREATHING = Mushroom(
 def captives(speed: float, n: int) -> list[State]:
     """Return particles of the island of BREATHING, |sin phi_hat| > 0.55, at t = 0."""
     random = np.random.default_rng(7)
-    r = float(value(fp, BREATHING.r, 0.0))
+    r = float(BREATHING.laws["r"].value(fp, 0.0))
     found: list[State] = []
     while len(found) < n:
         x = random.uniform(-r, r)
@@ -169,7 +168,7 @@ def drifts(t: float, speed: float, of: Callable[..., float]) -> float:
     """Return the largest change by time t of a function of (x, y, vx, vy, r)."""
     starts = captives(speed, 40)
     largest = 0.0
-    r0, r1 = (float(value(fp, BREATHING.r, at)) for at in (0.0, t))
+    r0, r1 = (float(BREATHING.laws["r"].value(fp, at)) for at in (0.0, t))
     for start, end in zip(starts, fast.flow(BREATHING, starts, t).outcomes, strict=True):
         assert isinstance(end, Horizon)
         before = of(start.x, start.y, start.vx, start.vy, r0)

@@ -39,8 +39,8 @@ from theory.finite_energy.one_cycle import FiniteEnergy, at_energy
 from theory.finite_energy.rates import Rates, frozen_rates
 from theory.finite_energy.upright import is_upright, kept_by_the_cap, upright_rate, upright_spread
 from theory.prediction import Prediction, cumulants, mean_of, moments, predict, reversed_cycle
+from theory.prepared import NotCovered
 from theory.volumes import (
-    NotCovered,
     Volumes,
     cap_invariant,
     delta,

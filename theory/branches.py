@@ -27,12 +27,13 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
 from scene.refusal import BadInput, check_count
-from scene.tables import Scene, check_scene
+from scene.tables import Scene
 from theory.adiabatic import Captures, Placed, SolvedWell
-from theory.cycle import Cycle
+from theory.cycle import cycle_of
 from theory.precision import finite_array, guarded
 from theory.prediction import resolutions
-from theory.volumes import in_near_units, volumes_at
+from theory.prepared import PreparedMushroom, prepare
+from theory.volumes import volumes_of
 
 Floats = NDArray[np.float64]
 
@@ -167,23 +168,37 @@ class Node(NamedTuple):
         return self.passed * float(np.prod([child.p_nc for child in self.children]))
 
 
-@guarded
+class SolvedCycle(NamedTuple):
+    """A cycle in binary64: the tree of its wells, when it starts, its period or 0 [time]."""
+
+    root: Node
+    start: float
+    period: float
+
+
 def tree(scene: Scene) -> Node:
     """Solve a cycle to 15 digits and bring it to binary64.
 
     Raises:
         NotCovered, NotConverged: as `theory.predict`.
     """
-    check_scene(scene)
-    return _solved(scene)
+    return solve_cycle(prepare(scene)).root
+
+
+@guarded
+def solve_cycle(mushroom: PreparedMushroom) -> SolvedCycle:
+    """Solve a cycle as `tree` does, or find it as it was solved before."""
+    return _solved(mushroom)
 
 
 @lru_cache(maxsize=32)
-def _solved(scene: Scene) -> Node:
+def _solved(mushroom: PreparedMushroom) -> SolvedCycle:
     # Every curve and histogram of a scene asks for its tree again. Its arrays are shared, hence read only.
-    found = next(resolutions(scene, Cycle.of(scene, DIGITS)))
+    cycle = cycle_of(mushroom, DIGITS)
+    found = next(resolutions(mushroom, cycle))
     with found.binary.working():
-        return _node(found, found.root, map(_branch, found.placed))
+        root = _node(found, found.root, map(_branch, found.placed))
+    return SolvedCycle(root, float(cycle.start), float(cycle.period or 0.0))
 
 
 def _branch(placed: Placed) -> Branch:
@@ -329,16 +344,21 @@ def chaotic_zone(scene: Scene, times: ArrayLike) -> ChaoticZone:
     Source: Eq:dE integrated, Eq:ps.
     """
     t = finite_array("times", times, n_dimensions=1)
-    cycle = Cycle.of(scene, DIGITS)
-    start = float(cycle.start)
+    return zone_of(prepare(scene), t)
+
+
+def zone_of(mushroom: PreparedMushroom, t: Floats) -> ChaoticZone:
+    """Return the `chaotic_zone` of a mushroom that is prepared, at times (n,)."""
+    root, start, period = solve_cycle(mushroom)
     n_before = np.zeros_like(t)
-    if cycle.period is not None:
-        n_before = np.floor((t - start) / float(cycle.period))
-        t = t - n_before * float(cycle.period)
-    near, _, unit = in_near_units(scene)
-    then = volumes_at(fp, near, math.ldexp(start, -unit)).v_cha
-    log_energy = -np.log(volumes_at(np, near, np.ldexp(t, -unit)).v_cha / then)
-    root = tree(scene)
+    if not math.isfinite(period):
+        raise BadInput("the scene's period is beyond binary64: give its laws other units")
+    if period:
+        n_before = np.floor((t - start) / period)
+        t = t - n_before * period
+    near, _, unit = mushroom.near
+    then = volumes_of(fp, near, math.ldexp(start, -unit)).v_cha
+    log_energy = -np.log(volumes_of(np, near, np.ldexp(t, -unit)).v_cha / then)
     branches = tuple(root.all_branches())
     if not branches:
         return ChaoticZone(log_energy, np.ones_like(t))

@@ -7,7 +7,7 @@ repeated division gives its multiplicity, so no critical point is missed however
 are. Between neighbouring ones nu is strictly monotone or at rest.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from math import floor
@@ -15,11 +15,9 @@ from typing import Any, NamedTuple
 
 from scene import exact
 from scene.exact import half_angle, leg_intervals, leg_polynomial
-from scene.laws import BangBang, Law, is_constant
-from scene.mouth import mouth_factors
+from scene.laws import Law
 from scene.pieces import exact as number
-from scene.tables import Mushroom, laws, period
-from theory.volumes import NotCovered
+from theory.prepared import NotCovered, PreparedMushroom
 
 MANY_BITS = 512  # beyond which Newton's method begins with fewer
 
@@ -39,34 +37,36 @@ class Span(NamedTuple):
     critical: tuple[Any, ...]
 
 
-def spans(ctx: Any, scene: Mushroom) -> list[Span]:
+def spans(ctx: Any, mushroom: PreparedMushroom) -> list[Span]:
     """Cut one period into spans, in order of time; an empty list when nu never changes.
 
     Args:
         ctx: number system of the times [time].
-        scene: a valid mushroom.
+        mushroom: as it is prepared.
+
+    Raises:
+        NotCovered: a factor is polynomials of time and the other waves; or nu' is beyond a parabola.
 
     Source: eq:dnu.
     """
-    moving = [law for law in laws(scene).values() if not is_constant(law)]
-    width, radius = mouth_factors(scene)
-    if is_constant(width) and is_constant(radius):
+    width, radius = mushroom.mouth
+    if width.is_constant and radius.is_constant:
         return []
-    legs = [law for law in moving if isinstance(law, BangBang)]
-    kinds = {type(law) for law in (width, radius) if not is_constant(law)}
-    if len(kinds) > 1:
+    jointed = mushroom.jointed
+    if width.is_polynomial and radius.is_polynomial:
+        return list(_polynomial_spans(ctx, jointed, width, radius))
+    if not (width.is_trigonometric and radius.is_trigonometric):
         raise NotCovered(
             "nu = w / r of a Fourier and a bang-bang law: give the mouth by `nu`, a law of one kind"
         )
-    if kinds == {BangBang}:
-        return list(_bang_bang_spans(ctx, legs, width, radius))
-    shared = period(scene)
+    shared = mushroom.cycle
     assert shared is not None
     found = _fourier_spans(ctx, shared.value(ctx), width, radius)
-    if not legs:
+    if not jointed:
         return found
     assert shared.length is not None
-    return _cut(ctx, found, [a % shared.length for a, _ in leg_intervals(legs)], shared.length)
+    cuts = [begin % shared.length for begin, _ in leg_intervals(jointed)]
+    return _cut(ctx, found, cuts, shared.length)
 
 
 def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], whole: Fraction) -> list[Span]:
@@ -93,13 +93,18 @@ def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], whole: Fraction) -> 
     return pieces
 
 
-def _bang_bang_spans(ctx: Any, moving: list[BangBang], width: Law, radius: Law) -> Iterator[Span]:
-    for a, b in leg_intervals(moving):
+def _polynomial_spans(ctx: Any, jointed: Sequence[Law], width: Law, radius: Law) -> Iterator[Span]:
+    """Cut a period of laws that are polynomials of time between the joints of all moving laws."""
+    for a, b in leg_intervals(jointed):
         w, r = leg_polynomial(width, a), leg_polynomial(radius, a)
         slope = exact.add(
             exact.multiply(exact.derivative(w), r),
             exact.scale(exact.multiply(w, exact.derivative(r)), Fraction(-1)),
         )
+        if len(slope) > 3:
+            raise NotCovered(
+                "nu = w / r of polynomials beyond parabolas: give the mouth by `nu`, a cubic at most"
+            )
         begin, last = number(ctx, a), (number(ctx, b), _multiplicity_at(slope, b - a))
         turns = [(begin + x, m) for x, m in _roots(ctx, slope, Fraction(0), b - a)]
         times = [(begin, _multiplicity_at(slope, Fraction(0))), *turns, last]

@@ -11,9 +11,10 @@ peak the well splits into wells that follow one another in time. Plateaus and in
 everywhere. The binary64 numbers of a scene are exact; a swing of nu below 10^-(digits + 30) of its largest
 value counts as none.
 
-Parameters are the same functions of time as `scene.laws.evaluate` gives, in gmpy2's numbers, ten times as
-fast as mpmath's, with one sine and cosine for all laws and harmonics: a cycle inverts nu(t) and takes volumes
-thousands of thousands of times. It is inverted in binary64 first.
+Parameters are the same functions of time as `evaluate` of a law's pieces. They are computed in
+gmpy2's numbers, ten times as fast as mpmath's, with one sine and cosine for all laws and harmonics:
+a cycle inverts nu(t) and takes volumes thousands of thousands of times. It is inverted in binary64
+first.
 """
 
 from __future__ import annotations
@@ -27,15 +28,13 @@ from typing import Any, NamedTuple
 
 from mpmath import fp
 
-from scene.laws import piece_at
-from scene.mouth import mouth_factors
-from scene.pieces import Piece, PolynomialPiece, TrigonometricPiece, exact
+from scene.pieces import Period, Piece, PolynomialPiece, TrigonometricPiece, exact
 from scene.precision import Decimals
 from scene.refusal import BadInput, check_count
-from scene.tables import Mushroom, Scene, laws, period
+from scene.tables import Scene
 from theory.critical import Span, solve_rising, spans
 from theory.precision import MAX_DIGITS, Binary, guarded, one_of, settle
-from theory.volumes import NotCovered, as_mushroom
+from theory.prepared import NotCovered, PreparedMushroom, prepare
 
 # Digits beyond those asked. A loop that binary64 cannot tell from a trivial one has g - 1 ~ 1e-16 and
 # m1 ~ 1e-32; with 40 more digits such an m1 still differs from zero.
@@ -79,19 +78,8 @@ class Cycle:
 
         Source: sec. 3.5, Eq:nu.
         """
-        mushroom = as_mushroom(scene)
-        digits = check_count("digits", digits, 1, MAX_DIGITS)
-        ctx = Decimals(digits + GUARD)
-        settle(ctx)
-        shared = period(mushroom)
-        length = shared.value(ctx) if shared else None
-        run = stretches(ctx, mushroom)
-        if not run:
-            nu, _ = MovingMushroom(ctx, mushroom, Fraction(0)).nu(ctx.zero)
-            return cls(ctx, digits, ctx.zero, length, nu, nu, NuWell((), ()))
-        found = nu_well(ctx, run, tolerance(ctx, run))
-        levels = [nu for piece in found.all_pieces() for nu in (piece.nu_upper, piece.nu_lower)]
-        return cls(ctx, digits, run[0].upper, length, max(levels), min(levels), found)
+        mushroom = prepare(scene)
+        return cycle_of(mushroom, check_count("digits", digits, 1, MAX_DIGITS))
 
     @property
     def binary(self) -> Binary:
@@ -254,9 +242,27 @@ class NuWell(NamedTuple):
             yield from child.all_pieces()
 
 
-def stretches(ctx: Any, scene: Mushroom) -> list[MonotoneStretch]:
-    """Return one period's stretches in order of time, from a highest maximum of nu; [] if nu is constant."""
-    every = [(span, _stretch(ctx, scene, span)) for span in spans(ctx, scene)]
+@guarded
+def cycle_of(mushroom: PreparedMushroom, digits: int) -> Cycle:
+    """Return `Cycle.of` a mushroom that is prepared."""
+    ctx = Decimals(digits + GUARD)
+    settle(ctx)
+    length = None if mushroom.cycle is None else mushroom.cycle.value(ctx)
+    run = stretches(ctx, mushroom)
+    if not run:
+        nu, _ = MovingMushroom(ctx, mushroom, Fraction(0)).nu(ctx.zero)
+        return Cycle(ctx, digits, ctx.zero, length, nu, nu, NuWell((), ()))
+    found = nu_well(ctx, run, tolerance(ctx, run))
+    levels = [nu for piece in found.all_pieces() for nu in (piece.nu_upper, piece.nu_lower)]
+    return Cycle(ctx, digits, run[0].upper, length, max(levels), min(levels), found)
+
+
+def stretches(ctx: Any, mushroom: PreparedMushroom) -> list[MonotoneStretch]:
+    """Return one period's stretches in order of time, from a highest maximum of nu.
+
+    The list is empty if nu is constant.
+    """
+    every = [(span, _stretch(ctx, mushroom, span)) for span in spans(ctx, mushroom)]
     small = tolerance(ctx, [s for _, s in every])
     found = [(span, s) for span, s in every if s.nu_upper - s.nu_lower > small]  # the others are plateaus
     tops = [i for i, (_, s) in enumerate(found) if is_fall(s) and not is_fall(found[i - 1][1])]
@@ -264,7 +270,8 @@ def stretches(ctx: Any, scene: Mushroom) -> list[MonotoneStretch]:
         return []
     highest = max(found[i][1].nu_upper for i in tops)
     first = next(i for i in tops if highest - found[i][1].nu_upper <= small)
-    later = [_stretch(ctx, scene, _next_period(ctx, scene, span)) for span, _ in found[:first]]
+    next_spans = (_next_period(ctx, mushroom.cycle, span) for span, _ in found[:first])
+    later = [_stretch(ctx, mushroom, span) for span in next_spans]
     return [s for _, s in found[first:]] + [s for s in later if s.nu_upper - s.nu_lower > small]
 
 
@@ -309,8 +316,7 @@ def _between(branch: list[MonotoneStretch], upper: Any, lower: Any, small: Any) 
     return [s.between(min(s.nu_upper, upper), max(s.nu_lower, lower), small) for s in inside]
 
 
-def _next_period(ctx: Any, scene: Mushroom, span: Span) -> Span:
-    shared = period(scene)
+def _next_period(ctx: Any, shared: Period | None, span: Span) -> Span:
     assert shared is not None
     length = shared.value(ctx)
     return span._replace(
@@ -321,11 +327,11 @@ def _next_period(ctx: Any, scene: Mushroom, span: Span) -> Span:
     )
 
 
-def _stretch(ctx: Any, scene: Mushroom, span: Span) -> MonotoneStretch:
+def _stretch(ctx: Any, mushroom: PreparedMushroom, span: Span) -> MonotoneStretch:
     """Return the stretch of a span, or of a plateau what looks like one."""
     if not span.start < span.end:
         raise NotCovered(f"the mouth turns twice in so short a time that {ctx.dps} digits do not tell when")
-    motion = MovingMushroom(ctx, scene, span.inside)
+    motion = MovingMushroom(ctx, mushroom, span.inside)
     ends = [
         (motion.nu(span.start)[0], span.start, span.start_order),
         (motion.nu(span.end)[0], span.end, span.end_order),
@@ -373,11 +379,11 @@ class MovingMushroom:
         binary: that in which they are worked out.
     """
 
-    def __init__(self, ctx: Any, scene: Mushroom, time: Fraction) -> None:
+    def __init__(self, ctx: Any, mushroom: PreparedMushroom, time: Fraction) -> None:
         self.ctx, self.binary = ctx, Binary(ctx)
-        self._made_of = ctx, scene, time
-        pieces = {name: piece_at(law, time) for name, law in laws(scene).items()}
-        width, radius = (piece_at(law, time) for law in mouth_factors(scene))
+        self._made_of = ctx, mushroom, time
+        pieces = {name: law.piece_at(time) for name, law in mushroom.laws.items()}
+        width, radius = (law.piece_at(time) for law in mushroom.mouth)
         with self.binary.working():
             self._turn = _turning(self.binary, pieces.values())
             self._parameters = {name: _parameter(self.binary, piece) for name, piece in pieces.items()}

@@ -24,7 +24,8 @@ from theory.branches import turns
 from theory.critical import solve_rising
 from theory.precision import guarded, real_numbers
 from theory.prediction import converged
-from theory.volumes import NotCovered, delta_slope, free_share
+from theory.prepared import NotCovered
+from theory.volumes import delta_slope, free_share
 
 REACH = 2.0**-12  # of a panel, around a turning point that is known in binary64
 

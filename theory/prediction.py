@@ -20,17 +20,17 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from scene.laws import GivenLaw
+from scene.laws import Law
 from scene.notebook import rows
 from scene.precision import reduce_record
 from scene.refusal import BadInput, check_count, check_number, shown
-from scene.tables import Mushroom, Scene, laws
+from scene.tables import Mushroom, Scene
 from scene.transforms import backwards
 from theory.adiabatic import Captures, NotConverged, captures, refined, silent
 from theory.chebyshev import logarithm
-from theory.cycle import GUARD, Cycle
+from theory.cycle import GUARD, Cycle, cycle_of
 from theory.precision import MAX_DIGITS, MAX_ORDER, guarded, one_of
-from theory.volumes import as_mushroom
+from theory.prepared import PreparedMushroom, as_mushroom, prepare
 
 MOST_RESOLUTIONS = 4
 # Decimals beyond those asked to which parts are halved anew, by resolution. Figures may be small beside 1:
@@ -209,12 +209,13 @@ def converged(
     Raises:
         NotConverged: they do not, as far as the resolution may rise.
     """
+    mushroom = prepare(scene)
     digits = check_count("digits", digits, 1, MAX_DIGITS)
-    cycle = Cycle.of(scene, digits)
+    cycle = cycle_of(mushroom, digits)
     ctx, binary = cycle.ctx, cycle.binary
     noise, agreement = ctx.mpf(10) ** -(digits + GUARD - 10), ctx.mpf(10) ** -(digits + 2)
     previous: tuple[Any, ...] | None = None
-    for found in resolutions(scene, cycle, progress):
+    for found in resolutions(mushroom, cycle, progress):
         with binary.working():
             current = tuple(binary.given(x) for x in figures(found))
         current = tuple(ctx.zero if abs(x) < noise else x for x in current)
@@ -229,20 +230,22 @@ def converged(
 
 
 def resolutions(
-    scene: Scene, cycle: Cycle, progress: Callable[[int, float], None] | None = None
+    mushroom: PreparedMushroom, cycle: Cycle, progress: Callable[[int, float], None] | None = None
 ) -> Iterator[Captures]:
     """Yield a cycle's captures, resolved more and more finely.
 
     Args:
-        scene: what the cycle is of.
-        cycle: `Cycle.of` the scene.
+        mushroom: what the cycle is of.
+        cycle: `cycle_of` it.
         progress: called with the number of the resolution and the share of it that is done; what is kept is
             reported as done.
 
     Raises:
         NotConverged: as `captures`.
     """
-    kept = _place(tuple(laws(scene).items()), cycle.digits) if cycle.digits <= FEW_DIGITS else []
+    kept: list[Captures] = []
+    if cycle.digits <= FEW_DIGITS:
+        kept = _place(tuple(mushroom.laws.items()), cycle.digits)
     for number in range(MOST_RESOLUTIONS):
         on_progress = silent if progress is None else partial(progress, number + 1)
         if number < len(kept):
@@ -255,6 +258,6 @@ def resolutions(
 
 
 @lru_cache(maxsize=KEPT)
-def _place(given: tuple[tuple[str, GivenLaw], ...], digits: int) -> list[Captures]:
+def _place(given: tuple[tuple[str, Law], ...], digits: int) -> list[Captures]:
     """Return the place of the solutions of a cycle: a list, empty at first."""
     return []

@@ -10,25 +10,17 @@ Invariants and rates of energy follow from them.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpmath import fp
 
-from scene.laws import GivenLaw, value
 from scene.precision import reduce_record
 from scene.refusal import BadInput, check_number, shown
-from scene.tables import Mushroom, Scene, check_scene
-from scene.transforms import scaled
+from scene.tables import Scene
 from theory.precision import check_real, in_system
+from theory.prepared import PreparedMushroom, prepare
 
-FAR = 100  # powers of two of a length or a time, beyond which others are taken for units
 WIDE = 0.75  # nu from which the island's share is summed as a series
-
-
-class NotCovered(BadInput):
-    """The theory does not cover this scene; the message says why."""
 
 
 class Volumes(NamedTuple):
@@ -144,41 +136,20 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
         NotCovered: the table is no mushroom.
         BadInput: no scene, no number system or no finite time.
     """
-    mushroom = as_mushroom(scene)
+    mushroom = prepare(scene)
     (t,) = in_system(ctx, t=t)
-    if ctx is np:
-        t = np.asarray(t)
+    return volumes_of(ctx, mushroom, np.asarray(t) if ctx is np else t)
 
-    def at(law: GivenLaw) -> Any:
-        return value(ctx, law, t)
 
-    r, h, slope = at(mushroom.r), at(mushroom.h), at(mushroom.slope)
-    nu = at(mushroom.w) / r if mushroom.w is not None else at(mushroom.nu or 0.0)
+def volumes_of(ctx: Any, mushroom: PreparedMushroom, t: Any) -> Volumes:
+    """Return `volumes_at` of a mushroom that is prepared, at a time that is a number of ctx."""
+    r, h, slope = (mushroom.laws[name].value(ctx, t) for name in ("r", "h", "slope"))
+    width, radius = mushroom.mouth
+    nu = width.value(ctx, t) / radius.value(ctx, t)
     # A valid scene has nu <= 1: what exceeds it is rounding.
     nu = np.minimum(nu, 1.0) if ctx is np else min(nu, ctx.mpf(1))
     cap, stem = v_cap(ctx, r), v_stem(ctx, nu * r, h, slope)
     return Volumes(cap, stem, delta(ctx, nu) * cap, free_share(ctx, nu) * cap + stem, nu)
-
-
-def in_near_units(scene: Scene) -> tuple[Scene, int, int]:
-    """Return a scene whose squares and cubes binary64 holds, and its units, as powers of two of the own."""
-    length, time = (math.frexp(x)[1] for x in (float(value(fp, as_mushroom(scene).r, 0.0)), scene.period))
-    if max(abs(length), abs(time)) <= FAR:
-        return scene, 0, 0  # solved already, maybe
-    return scaled(scene, -length, -time), length, time
-
-
-def as_mushroom(scene: Scene) -> Mushroom:
-    """Return the scene when it is a mushroom.
-
-    Raises:
-        NotCovered: it is a cap or a stem.
-        BadInput: it is no scene.
-    """
-    check_scene(scene)
-    if isinstance(scene, Mushroom):
-        return scene
-    raise NotCovered(f"the theory is of mushrooms: table is {scene.__struct_config__.tag}")
 
 
 def energy(ctx: Any, vx: Any, vy: Any) -> Any:

@@ -182,6 +182,7 @@ def questions(scene: Scene, states: Sequence[State]) -> Questions:
 
 
 def _row(law: Law) -> FloatArray:
+    """Lay out a law for the engines in C. Nothing else here asks for its kind."""
     row, pairs = np.zeros(LAW_LENGTH), list[tuple[float, float]]()
     if isinstance(law, BangBang):
         row[0], pairs = BANG_BANG, list(law.knots)

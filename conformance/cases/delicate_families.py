@@ -26,8 +26,6 @@ from conformance.cases.scenes import (
     state,
 )
 from scene import BangBang, Cap, Collision, Fourier, GivenLaw, Mushroom, Scene, State, Stem, Wall
-from scene.laws import value
-from scene.tables import laws
 from scene.transforms import scaled, scaled_state
 
 FINE = MPContext()
@@ -161,7 +159,6 @@ def knot_at_event(draw: Draw) -> Question:
     start, _ = state(draw, of, {"t": 0.0, "site": draw.pick(("cap", "stem")), "speed": 0.25})
     before: list[Any] = [start, *plain.trajectory(of, start, 3, NEVER)]
     n = draw.pick((1, 1, 2, 3))
-    known = laws(of)
     if not all(isinstance(hit, State | Collision) for hit in before) or len(before) <= n:
         raise Unfit("no such hit")
     last, hit = before[n - 1 : n + 1]
@@ -181,7 +178,7 @@ def knot_at_event(draw: Draw) -> Question:
     late = State(turns, start.x, start.y, start.vx, start.vy, start.wall)
     bits = math.log2(max(turns, 1.0)) - math.log2(width) + draw.pick(range(-16, 4))
     working = min(max(round((bits - 8) / math.log2(10)), 6), 60)
-    other_scene = Mushroom(**known | {name: leg})  # type: ignore[arg-type]
+    other_scene = msgspec.structs.replace(of, **{name: leg})
     return Question(other_scene, late, NEVER, n + draw.pick((0, 1)), working=working)
 
 
@@ -190,7 +187,7 @@ def across_a_knot(draw: Draw) -> Question:
     period = draw.pick((0.5, 1.0, 3.0))
     which = draw.pick(("r", "h", "w"))
     law = many_legs(draw, 0.6, 2.0, period, draw.pick((3, 4, 5)))
-    (t0, _), (t1, _) = law.knots[0:2]
+    t0, _, t1 = map(float, law.breakpoints()[:3])
     t = period * draw.pick((0, 0, 1, 100, 1000)) + t1 - (t1 - t0) * 10.0 ** -draw.between(0.5, 6.0)
     sizes: dict[str, GivenLaw] = {"r": 4.0, "h": 1.0, "w": 0.3, which: law}
     walls: dict[str, Wall] = {"r": "arc", "h": "floor", "w": draw.pick(SIDES)}
@@ -327,7 +324,7 @@ def nearly_shut(draw: Draw) -> Question:
     """
     law, t = _next_to_nothing(draw)
     part = draw.pick((1.0, -1.0)) * 10.0 ** -draw.between(4.0, 11.0)
-    size = float(value(FINE, law, FINE.mpf(t)) * (1 + FINE.mpf(part)))
+    size = float(law.value(FINE, FINE.mpf(t)) * (1 + FINE.mpf(part)))
     x = size * draw.pick((1.0, -1.0))
     made = Mushroom(r=1.5, w=law, h=1.0)
     before = draw.power(-40, -20)  # and so much later, or as exactly as times are, at the mouth

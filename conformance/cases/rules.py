@@ -36,7 +36,6 @@ from scene import Scene, State, Wall, from_data
 from scene.geometry import TableAt, rounded
 from scene.protocol.messages import MAX_SEQ
 from scene.protocol.rules import LATE, is_late
-from scene.tables import period
 
 
 def sample(name: str, key: object, is_kept: bool) -> RuleCase:
@@ -241,7 +240,7 @@ def early(draw: Draw, is_kept: bool) -> RuleCase:
     laws = (1.0, wave(draw), legs([[0.0, 1.0], [0.5, 1.25], [1.5, 1.0]]))
     scene = {**CAP, "r": draw.pick(laws)}
     of = from_data(scene)
-    shared = period(of)
+    shared = of.cycle
     bound = LATE * (
         1.0 if shared is None else float(shared.length or 2 * math.pi / (shared.omega or 1.0))
     )

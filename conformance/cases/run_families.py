@@ -55,7 +55,7 @@ from conformance.cases.scenes import (
 from conformance.plain.step import Flight
 from scene import BangBang, Cap, Fourier, GivenLaw, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded
-from scene.laws import MAX_KNOTS, bounds, is_constant
+from scene.laws import MAX_KNOTS, law_of
 from scene.transforms import scaled, scaled_law, scaled_state
 
 WALLS: tuple[tuple[str, Wall], ...] = tuple(
@@ -106,7 +106,7 @@ def under_a_growing_cap(draw: Draw) -> Mushroom:
     """Draw a mushroom whose mouth and sides move with its cap alone."""
     shared = clock(draw, MOVING)
     r = law(draw, 0.5, 2.0, shared)
-    if is_constant(r):
+    if law_of(r).is_constant:
         raise Unfit("the cap is at rest")
     return Mushroom(
         r=r, nu=draw.short(0.3, 0.9), h=law(draw, 0.5, 1.5, shared), slope=draw.short(-0.3, 0.05)
@@ -134,7 +134,7 @@ def leaning(draw: Draw) -> Question:
     depth = draw.pick(range(DEPTHS[0], DEPTHS[1] + 1))
     w, h = law(draw, 0.25, 0.5, shared), law(draw, 0.5, 1.0, shared)
     part = draw.pick((1.0, -1.0)) * draw.between(0.1, 0.27)
-    of = Stem(w=w, h=scaled_law(h, depth, 0), slope=part * bounds(w).lowest * 2.0**-depth)
+    of = Stem(w=w, h=scaled_law(h, depth, 0), slope=part * law_of(w).bounds().lowest * 2.0**-depth)
     t = time(draw, of)
     flight = (of.period or 1.0) * draw.power(-4, 1)
     table = rounded(of, t)
@@ -148,10 +148,10 @@ def leaning(draw: Draw) -> Question:
 
 def is_leaning(of: Scene) -> bool:
     """Tell whether a scene is such a stem."""
-    return (
-        isinstance(of, Stem)
-        and bounds(of.h).highest > 2.0 ** (DEPTHS[0] - 2) * bounds(of.w).highest
-    )
+    if not isinstance(of, Stem):
+        return False
+    deepest, widest = (of.laws[name].bounds().highest for name in ("h", "w"))
+    return deepest > 2.0 ** (DEPTHS[0] - 2) * widest
 
 
 def changed_mouth(draw: Draw) -> Question:
@@ -197,9 +197,8 @@ def vibrating(table: str, draw: Draw) -> Question:
     )
     if not of.period:
         raise Unfit("the walls are at rest")
-    wide, high = (
-        bounds(law).lowest for law in ((of.r, of.r) if isinstance(of, Cap) else (of.w, of.h))
-    )
+    names = ("r", "r") if table == "cap" else ("w", "h")
+    wide, high = (of.laws[name].bounds().lowest for name in names)
     flight = of.period * draw.power(5, 9) * draw.between(0.5, 1.0)
     way = 1.0 if table == "cap" else -1.0
     y = high * draw.between(0.05, 0.3)
@@ -391,7 +390,7 @@ def steep(draw: Draw) -> Question:
     depth = draw.power(-6, 0)
     w = law(draw, 0.5, 1.0, shared)
     h = law(draw, 0.5 * depth, depth, shared)
-    steepest = 0.9 * bounds(w).lowest / bounds(h).highest
+    steepest = 0.9 * law_of(w).bounds().lowest / law_of(h).bounds().highest
     low, high = draw.pick(((0.5, 1.0), (-1.0, -0.5), (-1.0, 1.0)))
     of = Stem(w=w, h=h, slope=law(draw, low * steepest, high * steepest, shared))
     return Question(

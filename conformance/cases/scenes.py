@@ -31,9 +31,8 @@ from scene import (
     Wall,
 )
 from scene.geometry import TableAt, rounded
-from scene.laws import MAX_KNOTS, bounds, breakpoints
+from scene.laws import MAX_KNOTS, law_of
 from scene.states import ON_WALL
-from scene.tables import laws
 from scene.transforms import scaled_law
 
 FEW_HARMONICS = ((1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (2, 2), (1, 3))  # of cosines, of sines
@@ -70,6 +69,10 @@ class Clock(NamedTuple):
     kind: str
     rate: float = 1.0
 
+    def of_waves(self) -> dict[str, float]:
+        """Return what says how long a Fourier law's waves are."""
+        return {"omega" if self.kind == "fourier" else "period": self.rate}
+
 
 def clock(draw: Draw, kinds: Sequence[str] = ("fourier", "bang-bang", "constant")) -> Clock:
     """Draw what the laws of a scene share."""
@@ -77,32 +80,47 @@ def clock(draw: Draw, kinds: Sequence[str] = ("fourier", "bang-bang", "constant"
     return Clock(kind, draw.short(0.5, 6.0) if kind == "fourier" else draw.pick(PERIODS))
 
 
+class Shapes(NamedTuple):
+    """What becomes of a law that was drawn: of a number, of one of legs, of a wave."""
+
+    number: Callable[[Draw, float], GivenLaw]
+    legs: Callable[[Draw, float, float, BangBang], GivenLaw]
+    wave: Callable[[Draw, float, float, Fourier], GivenLaw]
+
+
+AS_DRAWN = Shapes(
+    number=lambda _draw, found: found,
+    legs=lambda _draw, _low, _high, found: found,
+    wave=lambda _draw, _low, _high, found: found,
+)
+
+
 def law(draw: Draw, low: float, high: float, shared: Clock) -> GivenLaw:
     """Draw a law that stays within [low, high]; now and then one that stands still."""
-    if shared.kind == "mixed":
-        found = law(
-            draw, low, high, shared._replace(kind=draw.pick(("fourier", "bang-bang", "constant")))
-        )
-        return (
-            replace(found, omega=None, period=shared.rate) if isinstance(found, Fourier) else found
-        )
-    if shared.kind == "constant" or draw.pick(range(6)) == 0:
-        return draw.short(low, high)
-    if shared.kind == "bang-bang":
+    return _draw_law(draw, low, high, shared, AS_DRAWN)
+
+
+def _draw_law(draw: Draw, low: float, high: float, shared: Clock, shapes: Shapes) -> GivenLaw:
+    kind = shared.kind
+    if kind == "mixed":
+        kind = draw.pick(("fourier", "bang-bang", "constant"))
+    if kind == "constant" or draw.pick(range(6)) == 0:
+        return shapes.number(draw, draw.short(low, high))
+    if kind == "bang-bang":
         n = draw.pick((2, 3, 4))
         places = sorted({draw.pick(range(1, 64)) for _ in range(n - 1)})
         times = [0.0, *(shared.rate * place / 64 for place in places), shared.rate]
         values = [draw.short(low, high) for _ in times[1:]]
-        return BangBang(knots=tuple(zip(times, [*values, values[0]], strict=True)))
+        legs = BangBang(knots=tuple(zip(times, [*values, values[0]], strict=True)))
+        return shapes.legs(draw, low, high, legs)
     mean = draw.short(0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high)
-    n_cos, n_sin = draw.pick(MANY_HARMONICS if shared.kind == "harmonics" else FEW_HARMONICS)
+    n_cos, n_sin = draw.pick(MANY_HARMONICS if kind == "harmonics" else FEW_HARMONICS)
     size = 0.999 * min(high - mean, mean - low) / (n_cos + n_sin)
     amplitudes = [draw.short(-size, size) for _ in range(n_cos + n_sin)]
     cos = tuple(amplitudes[:n_cos])
     sin = tuple(amplitudes[n_cos:])
-    if shared.kind == "harmonics":
-        return Fourier(mean=mean, period=shared.rate, cos=cos, sin=sin)
-    return Fourier(mean=mean, omega=shared.rate, cos=cos, sin=sin)
+    wave = Fourier(mean=mean, cos=cos, sin=sin, **shared.of_waves())
+    return shapes.wave(draw, low, high, wave)
 
 
 def deep_wave(draw: Draw, low: float, high: float, omega: float) -> Fourier:
@@ -133,19 +151,25 @@ def scene(draw: Draw, table: str, shared: Clock, law: LawDraw = law) -> Scene:
         return Cap(r=law(draw, 0.25, 2.0, shared))
     if table == "stem":
         w, h = law(draw, 0.25, 2.0, shared), law(draw, 0.5, 3.0, shared)
-        return Stem(w=w, h=h, slope=_slope(draw, bounds(w).lowest, bounds(h).highest, shared, law))
+        return Stem(w=w, h=h, slope=_slope(draw, _least(w), _greatest(h), shared, law))
     r, h = law(draw, 0.75, 2.0, shared), law(draw, 0.5, 3.0, shared)
-    narrowest = bounds(r).lowest
+    narrowest = _least(r)
     if draw.pick((False, True)):
         nu = law(draw, 0.2, 1.0, shared)
-        slope = _slope(draw, narrowest * bounds(nu).lowest, bounds(h).highest, shared, law)
+        slope = _slope(draw, narrowest * _least(nu), _greatest(h), shared, law)
         return Mushroom(r=r, nu=nu, h=h, slope=slope)
     if narrowest <= 0:  # of a deep wave no more is known: a mouth as wide might not fit
         raise Unfit("the cap may vanish")
     w = law(draw, narrowest / 4, narrowest * 0.99, shared)
-    return Mushroom(
-        r=r, w=w, h=h, slope=_slope(draw, bounds(w).lowest, bounds(h).highest, shared, law)
-    )
+    return Mushroom(r=r, w=w, h=h, slope=_slope(draw, _least(w), _greatest(h), shared, law))
+
+
+def _least(law: GivenLaw) -> float:
+    return law_of(law).bounds().lowest
+
+
+def _greatest(law: GivenLaw) -> float:
+    return law_of(law).bounds().highest
 
 
 def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock, law: LawDraw) -> GivenLaw:
@@ -165,29 +189,50 @@ def any_law(draw: Draw, low: float, high: float, shared: Clock) -> GivenLaw:
     wave may sink nearly to 0; a law may hardly move; one of legs begins anywhere, and may have as
     many as there may be.
     """
-    found = law(draw, low, high, shared)
+    return _draw_law(draw, low, high, shared, ANY_SHAPE)
+
+
+def _any_number(draw: Draw, found: float) -> GivenLaw:
+    """Write a constant in any way."""
     way = draw.pick((0, 1, 2, 3, 4))
-    if isinstance(found, float) and way == 4:
-        return Fourier(mean=found, omega=draw.short(0.5, 6.0), cos=(0.0,))
-    if isinstance(found, float):
-        begin = draw.pick(range(-16, 17)) / 16
-        knots = tuple((begin + t, found) for t in (0.0, 4.0, 8.0))
-        return BangBang(knots=knots) if way == 3 else found
     if way == 4:
-        found = _faint(found, 2.0 ** -draw.pick(FAINT))
-    elif way == 3 and isinstance(found, BangBang):
-        found = many_legs(draw, low, high, found.knots[-1][0])
-    elif way == 3 and isinstance(found, Fourier) and 0 < 8 * low < high:
-        found = replace(deep_wave(draw, low, high, 1.0), omega=found.omega, period=found.period)
-    return _begun_elsewhere(draw, found) if isinstance(found, BangBang) else found
+        return Fourier(mean=found, omega=draw.short(0.5, 6.0), cos=(0.0,))
+    begin = draw.pick(range(-16, 17)) / 16
+    knots = tuple((begin + t, found) for t in (0.0, 4.0, 8.0))
+    return BangBang(knots=knots) if way == 3 else found
 
 
-def _faint(of: Fourier | BangBang, part: float) -> Fourier | BangBang:
-    """Return a law that moves by so small a part of what this one moves by."""
-    if isinstance(of, BangBang):
-        first = of.knots[0][1]
-        return BangBang(knots=tuple((t, first + part * (v - first)) for t, v in of.knots))
-    return replace(of, cos=tuple(part * a for a in of.cos), sin=tuple(part * a for a in of.sin))
+def _any_legs(draw: Draw, low: float, high: float, found: BangBang) -> BangBang:
+    """Let a law of legs hardly move, or have many; and move its knots by a part of the period.
+
+    All sums of times are exact.
+    """
+    way = draw.pick((0, 1, 2, 3, 4))
+    knots = found.knots
+    if way == 4:
+        first = knots[0][1]
+        part = 2.0 ** -draw.pick(FAINT)
+        knots = tuple((t, first + part * (v - first)) for t, v in knots)
+    elif way == 3:
+        knots = many_legs(draw, low, high, knots[-1][0]).knots
+    by = knots[-1][0] * draw.pick((0, *range(-256, 256))) / 64
+    return BangBang(knots=tuple((t + by, v) for t, v in knots))
+
+
+def _any_wave(draw: Draw, low: float, high: float, found: Fourier) -> Fourier:
+    """Let a wave hardly move, or sink nearly to 0."""
+    way = draw.pick((0, 1, 2, 3, 4))
+    if way == 4:
+        part = 2.0 ** -draw.pick(FAINT)
+        cos, sin = (tuple(part * a for a in given) for given in (found.cos, found.sin))
+        return replace(found, cos=cos, sin=sin)
+    if way == 3 and 0 < 8 * low < high:
+        deep = deep_wave(draw, low, high, 1.0)
+        return replace(deep, omega=found.omega, period=found.period)
+    return found
+
+
+ANY_SHAPE = Shapes(_any_number, _any_legs, _any_wave)
 
 
 def many_legs(draw: Draw, low: float, high: float, period: float, n: int | None = None) -> BangBang:
@@ -201,17 +246,11 @@ def many_legs(draw: Draw, low: float, high: float, period: float, n: int | None 
     return BangBang(knots=tuple(zip(times, [*values, values[0]], strict=True)))
 
 
-def _begun_elsewhere(draw: Draw, of: BangBang) -> BangBang:
-    """Return a law with its knots moved by a part of the period; all sums are exact."""
-    by = of.knots[-1][0] * draw.pick((0, *range(-256, 256))) / 64
-    return BangBang(knots=tuple((t + by, v) for t, v in of.knots))
-
-
 def any_scene(draw: Draw, table: str | None = None, kinds: Sequence[str] = KINDS) -> Scene:
     """Draw a scene of a table, or of any: its laws may have any shape, and so may its stem."""
     found = scene(draw, table or draw.pick((*TABLES, "mushroom")), clock(draw, kinds), any_law)
     if not isinstance(found, Cap):
-        mouth = "w" if "w" in laws(found) else "nu"
+        mouth = "w" if "w" in found.laws else "nu"
         deeper = draw.pick(DEEPER)
         wider = draw.pick(NARROWER)
         powers = {mouth: wider, "h": deeper, "slope": wider - deeper}
@@ -226,7 +265,7 @@ def walls_speed(scene: Scene) -> float:
 
     nu moves the mouth at the scale of r, slope the sides at the scale of h.
     """
-    found = {name: bounds(law) for name, law in laws(scene).items()}
+    found = {name: law.bounds() for name, law in scene.laws.items()}
     reach = {name: found[of].highest for name, of in (("nu", "r"), ("slope", "h")) if name in found}
     return max(law.slope * reach.get(name, 1.0) for name, law in found.items())
 
@@ -246,7 +285,7 @@ def place(draw: Draw, at: TableAt, site: str) -> tuple[float, float]:
 def time(draw: Draw, scene: Scene, turns: int = 3) -> float:
     """Draw a time within some periods; now and then on a knot."""
     length = scene.period or 1.0
-    knots = [float(t) for law in laws(scene).values() for t in breakpoints(law)]
+    knots = [float(t) for law in scene.laws.values() for t in law.breakpoints()]
     if knots and draw.pick(range(5)) == 0:
         return length * draw.pick(range(turns)) + draw.pick(knots)
     return length * (draw.pick(range(turns)) + draw.part())

@@ -1,7 +1,7 @@
 """Mutants that follow a law of motion wrongly: its phase, harmonics, legs, periods, digits."""
 
 import struct
-from math import cos, floor, fmod, pi, sin
+from math import cos, floor, fmod, sin
 
 from mpmath import fp
 from msgspec.structs import replace
@@ -16,9 +16,7 @@ from conformance.plain.step import (
     LawMotion,
     LawValue,
 )
-from scene import BangBang, Fourier, GivenLaw, Outcome, Rejected, Scene, State
-from scene.laws import bounds, frequency
-from scene.tables import laws
+from scene import BangBang, Constant, Fourier, Law, Outcome, Rejected, Scene, State
 
 
 def single(x: float) -> float:
@@ -30,7 +28,7 @@ class Stopped(ConstantMotion):
     """A law that stands still from some time of flight on."""
 
     def __init__(self, law: LawMotion, span: float) -> None:
-        super().__init__(law.value, 0.0)
+        super().__init__(Constant(law.value), 0.0)
         self.law, self.span = law, span
 
     def at(self, s: float) -> LawValue:
@@ -49,12 +47,15 @@ def half_leg_acceleration_sign(
 
 
 @mutant(Flight, "law")
-def period_wrap_lost(flight: Flight, plain: Plain[LawMotion], law: GivenLaw) -> LawMotion:
+def period_wrap_lost(flight: Flight, plain: Plain[LawMotion], law: Law) -> LawMotion:
     """Lets a bang-bang law stand still outside its first period."""
-    if not isinstance(law, BangBang):
+    times = law.breakpoints()
+    if not times:
         return plain(law)
-    t, first, (last, value) = flight.state.t, law.knots[0][0], law.knots[-1]
-    return Stopped(plain(law), last - t) if first <= t < last else ConstantMotion(value, t)
+    t, first, last = flight.state.t, float(times[0]), float(times[-1])
+    if first <= t < last:
+        return Stopped(plain(law), last - t)
+    return ConstantMotion(Constant(law.value(fp, last)), t)
 
 
 @mutant(BangBangMotion, "__init__")
@@ -127,7 +128,7 @@ def three_harmonics_at_most(
 @mutant(FourierMotion, "__init__")
 def frequency_in_float32(motion: FourierMotion, plain: Plain[None], law: Fourier, t: float) -> None:
     """Keeps the angular frequency in binary32."""
-    plain(replace(law, omega=single(frequency(fp, law)), period=None), t)
+    plain(replace(law, omega=single(law.frequency(fp)), period=None), t)
 
 
 @mutant(FourierMotion, "__init__")
@@ -137,12 +138,10 @@ def period_for_frequency(motion: FourierMotion, plain: Plain[None], law: Fourier
 
 
 @mutant(Flight, "law")
-def first_period_only(flight: Flight, plain: Plain[LawMotion], law: GivenLaw) -> LawMotion:
+def first_period_only(flight: Flight, plain: Plain[LawMotion], law: Law) -> LawMotion:
     """Lets every law stand still after one period of flight."""
     motion = plain(law)
-    if isinstance(law, Fourier):
-        return Stopped(motion, 2 * pi / frequency(fp, law))
-    return Stopped(motion, motion.period) if isinstance(motion, BangBangMotion) else motion
+    return motion if law.cycle is None else Stopped(motion, float(law.cycle.value(fp)))
 
 
 @mutant(Flight, "__init__")
@@ -164,8 +163,8 @@ def place_in_float32(flight: Flight, plain: Plain[None], scene: Scene, state: St
 @mutant(Flight, "refusal")
 def sizes_judged_by_their_amplitudes(flight: Flight, plain: Plain[Outcome | None]) -> Outcome | None:
     """Refuses a scene in which a size's amplitudes add up to its mean or more, though it stays positive."""
-    for name, law in laws(flight.scene).items():
-        if name != "slope" and not bounds(law).lowest > 0:
+    for name, law in flight.scene.laws.items():
+        if name != "slope" and not law.bounds().lowest > 0:
             return Rejected(f"scene.{name} is negative at times")
     return plain()
 
@@ -206,4 +205,4 @@ def sine_and_cosine_swapped(motion: FourierMotion, plain: Plain[None], law: Four
 @mutant(FourierMotion, "__init__", COMMON)
 def pi_too_short(motion: FourierMotion, plain: Plain[None], law: Fourier, t: float) -> None:
     """Reduces the phase of a Fourier law by 2 x 3.14159."""
-    plain(law, t % (2 * 3.14159 / frequency(fp, law)))
+    plain(law, t % (2 * 3.14159 / law.frequency(fp)))

@@ -9,7 +9,6 @@ from conformance.mutants.mutant import Plain, mutant
 from conformance.plain.step import CaptureInterval, Flight, PlainPath, misses_mouth, width
 from scene import Collision, Mushroom, Outcome, State
 from scene.protocol.wire import Captured
-from scene.tables import laws
 
 Arrival = tuple[Outcome, Captured]
 
@@ -69,7 +68,7 @@ def captured_by_mouth_at_start(path: PlainPath, plain: Plain[bool], scene: Mushr
 @mutant(PlainPath, "is_captured")
 def captured_by_ratio_for_width(path: PlainPath, plain: Plain[bool], scene: Mushroom, hit: Collision) -> bool:
     """Compares the distance from the centre with w / r in place of w."""
-    radius = Flight.kinds[type(scene.r)](scene.r, hit.t).value
+    radius = Flight.motion(scene.laws["r"], hit.t).value
     return misses_mouth(width(scene, hit.t) / radius, hit, path.state.vx, path.state.vy)
 
 
@@ -145,6 +144,6 @@ def longest_capture_reported(path: PlainPath, plain: Plain[Arrival]) -> Arrival:
 @mutant(PlainPath, "arrival")
 def slope_ignored_in_flow(path: PlainPath, plain: Plain[Arrival]) -> Arrival:
     """Carries particles of a flow as if the sides were upright; its steps are right."""
-    if "slope" in laws(path.scene):
+    if "slope" in path.scene.laws:
         path.scene = replace(path.scene, slope=0.0)
     return plain()

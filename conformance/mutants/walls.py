@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from conformance.mutants.mutant import COMMON, Plain, mutant
 from conformance.plain.step import ConstantMotion, Flight, Gap, LawValue, UndecidedError
-from scene import Collision, Mushroom, Outcome, Scene, State, Wall
+from scene import Collision, Constant, Mushroom, Outcome, Scene, State, Wall
 
 Normal = tuple[float, float, float]
 Root = float | None
@@ -92,7 +92,7 @@ def sides_slant_from_the_floor(flight: Flight, plain: Plain[Gap], wall: Wall, s:
 def hold(flight: Flight, name: str) -> None:
     """Let a law stand still during a flight."""
     if name in flight.laws:
-        flight.laws[name] = ConstantMotion(flight.laws[name].value, 0.0)
+        flight.laws[name] = ConstantMotion(Constant(flight.laws[name].value), 0.0)
 
 
 @mutant(Flight, "__init__")

@@ -27,10 +27,11 @@ from scene import (
     BangBang,
     Cap,
     Collision,
+    Constant,
     Fourier,
-    GivenLaw,
     Horizon,
     InvalidState,
+    Law,
     Mushroom,
     Outcome,
     Rejected,
@@ -42,10 +43,8 @@ from scene import (
     Wall,
 )
 from scene.geometry import placed
-from scene.laws import bounds, frequency
 from scene.protocol.wire import Captured
 from scene.states import ON_WALL, Stepper, check_numbers
-from scene.tables import laws, width_factors
 
 ROUNDING = 2.0**-48  # f and f' are sums of a few terms, each rounded to some 2^-52 of its size
 LARGEST = 2.0**400  # squares of greater numbers overflow
@@ -71,8 +70,8 @@ class LawValue(NamedTuple):
 class ConstantMotion:
     """A law that is a number."""
 
-    def __init__(self, law: float, t: float) -> None:
-        self.value = law
+    def __init__(self, law: Constant, t: float) -> None:
+        self.value = law.level
 
     def at(self, s: float) -> LawValue:
         """Return the motion at the time s since departure."""
@@ -83,7 +82,7 @@ class FourierMotion:
     """A Fourier law from time t on: its waves a cos(f s) + b sin(f s) turned to begin there."""
 
     def __init__(self, law: Fourier, t: float) -> None:
-        self.omega = frequency(fp, law)
+        self.omega = law.frequency(fp)
         self.waves = [turned(k * self.omega, a, b, t) for k, a, b in law.harmonics()]
         self.value = law.mean + sum(a for _, a, _ in self.waves)
 
@@ -170,7 +169,7 @@ class UndecidedError(Exception):
 class Flight:
     """One straight flight from a state to its outcome; s is the time since departure."""
 
-    kinds: ClassVar = {float: ConstantMotion, Fourier: FourierMotion, BangBang: BangBangMotion}
+    kinds: ClassVar = {Constant: ConstantMotion, Fourier: FourierMotion, BangBang: BangBangMotion}
 
     def __init__(self, scene: Scene, state: State, t_end: float) -> None:
         self.scene, self.state, self.t_end = scene, state, t_end
@@ -178,17 +177,22 @@ class Flight:
         self.known: dict[tuple[Wall, float], Gap] = {}
         if self.wall is None and self.y == 0 and not isinstance(scene, Mushroom):
             self.wall = "base"
-        self.laws = {name: self.law(law) for name, law in laws(scene).items()}
-        self.bounds = {name: bounds(law) for name, law in laws(scene).items()}
+        self.laws = {name: self.law(law) for name, law in scene.laws.items()}
+        self.bounds = {name: law.bounds() for name, law in scene.laws.items()}
         self.sizes = {name: max(-law.lowest, law.highest) for name, law in self.bounds.items()}
         self.is_in_cap = self.starts_in_cap()
         self.end = min(t_end - state.t, self.escape())
         self.is_horizon = self.end == t_end - state.t
         self.crossing = self.crossing_time()
 
-    def law(self, law: GivenLaw) -> LawMotion:
+    def law(self, law: Law) -> LawMotion:
         """Return a law as seen from departure."""
-        found: LawMotion = self.kinds[type(law)](law, self.state.t)
+        return self.motion(law, self.state.t)
+
+    @classmethod
+    def motion(cls, law: Law, t: float) -> LawMotion:
+        """Return a law from time t on. Nothing else in this stepper asks for a law's kind."""
+        found: LawMotion = cls.kinds[type(law)](law, t)
         return found
 
     def starts_in_cap(self) -> bool:
@@ -594,7 +598,7 @@ class CaptureInterval(NamedTuple):
 
 def width(scene: Mushroom, t: float) -> float:
     """Return the half-width of the mouth at time t."""
-    return float(prod(Flight.kinds[type(law)](law, t).value for law in width_factors(scene)))
+    return float(prod(Flight.motion(law, t).value for law in scene.width.factors))
 
 
 def misses_mouth(w: float, at: Collision | State, vx: float, vy: float) -> bool:

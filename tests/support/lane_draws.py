@@ -15,7 +15,7 @@ from mpmath import fp
 from fast.kernel import records
 from fast.kernel.records import FloatArray
 from scene import BangBang, Fourier, GivenLaw, Mushroom, Wall
-from scene.geometry import TableAt, half_width, table_at
+from scene.geometry import TableAt, table_at
 from scene.laws import law_of
 from support.lane_anywhere import Start
 
@@ -97,7 +97,7 @@ def draw_crowd(scene: Mushroom, aim: Aim, random: np.random.Generator) -> FloatA
         x, y, vx, vy = chords(now, then, t, s, random)
         if random.random() < 0.5:
             # Straight down, to the mouth, which is as wide there and then but not at one of the ends.
-            widest = half_width(fp, scene, t + 0.5 * s)
+            widest = scene.width.value(fp, t + 0.5 * s)
             edge = now.w if random.random() < 0.5 else then.w
             x = edge + (widest - edge) * random.random(n)
             y = np.sqrt(np.maximum((now.r - x) * (now.r + x), 0.0))

@@ -18,10 +18,18 @@ from numpy.typing import ArrayLike
 
 from scene.refusal import BadInput, check_count, check_number, check_seed
 from scene.tables import Mushroom, Scene
-from theory.branches import Branch, Floats, Node, at, chaotic_zone, tree
-from theory.finite_energy.rates import N_TIMES, SPEEDS, Fields, Flags, cycle_coefficients, table_error
+from theory.branches import Branch, Floats, Node, at, solve_cycle, zone_of
+from theory.finite_energy.rates import (
+    N_TIMES,
+    SPEEDS,
+    Fields,
+    Flags,
+    cycle_coefficients,
+    find_rates,
+    table_error,
+)
 from theory.precision import finite_array
-from theory.volumes import NotCovered, as_mushroom
+from theory.prepared import NotCovered, as_mushroom, prepare
 
 N_PLACES = 2000  # at which distribution functions are computed; linear between them
 N_CAPTURES = 600  # point masses of a well that lies in no other; of one among several a fifth
@@ -105,7 +113,9 @@ class FiniteEnergy:
     """
 
     def __init__(self, scene: Scene, energy: float) -> None:
-        self.scene, self.energy = as_mushroom(scene), check_number("energy", energy)
+        self._mushroom = prepare(scene)
+        self.scene = self._mushroom.given
+        self.energy = check_number("energy", energy)
         if not 0 < energy <= LARGEST:
             raise BadInput(f"energy = {energy}, must be > 0 and at most 2^1000")
         with np.errstate(all="ignore"):  # lags as large as log E itself: refused below
@@ -124,7 +134,8 @@ class FiniteEnergy:
         self._below: dict[str, tuple[Floats, Floats]] = {}
 
     def _solve(self) -> None:
-        cycle, root = cycle_coefficients(self.scene), tree(self.scene)
+        cycle = cycle_coefficients(self._mushroom)
+        root = solve_cycle(self._mushroom).root
         self.s_nc = root.s_nc
         self._coefficients, self._fields = cycle, Fields(cycle, self.energy)
         self._n_captures = N_CAPTURES // 5 if root.children else N_CAPTURES
@@ -165,7 +176,7 @@ class FiniteEnergy:
         second = (
             float(captured.weight @ captured.shift**2) / p if (p := float(captured.weight.sum())) else 0.0
         )
-        diffusion_error, lag_error = table_error(self.scene)
+        diffusion_error, lag_error = table_error(find_rates(self._mushroom))
         # A shift of a size has an error by the rates too, in the same proportion.
         captured_mean = second + lag_error * second**0.5
         fields = self._fields
@@ -226,9 +237,9 @@ class FiniteEnergy:
         none = np.zeros(len(t))
         gathered = {name: self._fields.at(name, none, t) for name in ("variance", "squares", "lags", "drift")}
         variance = gathered["variance"] - gathered["squares"]
-        begun = chaotic_zone(self.scene, [self._coefficients.start]).log_energy[0]
+        begun = zone_of(self._mushroom, np.array([self._coefficients.start])).log_energy[0]
         drift = gathered["variance"] / 4 + gathered["drift"] - gathered["lags"]
-        return chaotic_zone(self.scene, t).log_energy - begun + drift, variance - variance**2 / 8
+        return zone_of(self._mushroom, t).log_energy - begun + drift, variance - variance**2 / 8
 
     def at_capture(self, times: ArrayLike) -> tuple[Floats, Floats]:
         """Return mean and variance of log E / E0 of particles first captured at each time; else as `zone`."""

@@ -25,13 +25,12 @@ from numpy.typing import NDArray
 
 import scene as scenes
 from scene.geometry import table_at
-from scene.laws import breakpoints, values
 from scene.mouth import start_time
-from scene.tables import Mushroom, Scene, laws
+from scene.tables import Scene
 from scene.transforms import backwards
-from theory.branches import Floats, chaotic_zone, tree
-from theory.cycle import Cycle
-from theory.volumes import NotCovered, as_mushroom, delta_slope, volumes_at
+from theory.branches import Floats, solve_cycle, zone_of
+from theory.prepared import NotCovered, PreparedMushroom, prepare
+from theory.volumes import delta_slope, volumes_of
 
 FILE = Path(__file__).with_name("frozen_rates.json")
 N_PHASES = 64
@@ -89,14 +88,19 @@ def pace(scene: Scene, times: Floats | float) -> Floats:
     A mouth told as w has another pace than the same mouth told as nu. Rates are over the pace of the scene
     that was measured, so they are to be multiplied by no other.
     """
-    squares = np.array([values(law, np.asarray(times), 1) ** 2 for law in laws(scene).values()])
+    squares = np.array([law.values(np.asarray(times), 1) ** 2 for law in scene.laws.values()])
     return np.asarray(np.sqrt(squares.sum(axis=0)), dtype=np.float64)
 
 
 def kick_rates(scene: Scene, times: Floats | float) -> Floats:
     """Return the chaotic zone's mean d log E / dt at times. In Eq:dE the terms in d delta cancel."""
-    times = np.asarray(times, dtype=np.float64)
-    now, volumes = table_at(fp, scene, times), volumes_at(np, scene, times)
+    return kick_rates_of(prepare(scene), np.asarray(times, dtype=np.float64))
+
+
+def kick_rates_of(mushroom: PreparedMushroom, times: Floats) -> Floats:
+    """Return the `kick_rates` of a mushroom that is prepared."""
+    now = table_at(fp, mushroom.given, times)
+    volumes = volumes_of(np, mushroom, times)
     cap = 2 * np.pi**2 * now.r * now.r_rate
     widening = now.w_rate * now.h + now.w * now.h_rate - now.h * now.h_rate * now.slope
     stem = 2 * np.pi * (2 * widening - now.h**2 * now.slope_rate)
@@ -111,37 +115,41 @@ def frozen_rates(scene: Scene) -> tuple[Rates, bool]:
     Raises:
         NotCovered: there are no rates for the scene or its reverse.
     """
-    _, rates, turned = _found(scene)
+    _, rates, turned = find_rates(prepare(scene))
     return rates, turned
 
 
-def _found(scene: Scene) -> tuple[Mushroom, Rates, bool]:
-    """Return the measured scene, its rates, and whether it is the reverse of what is sought."""
-    mushroom = as_mushroom(scene)
-    for turned in (False, True):
-        sought = backwards(mushroom) if turned else mushroom
-        for measured, rates in _table().values():
-            if _is_one_cycle(measured, sought):
-                return measured, rates, turned
-    known = ", ".join(_table())
-    raise NotCovered(
-        f"no frozen rates of scene {mushroom.name!r} are known, without which nothing is said of a finite"
-        f" energy, only of {known} and their reverses"
-    )
+class MeasuredRates(NamedTuple):
+    """A mushroom that was measured, its rates, and whether it is the reverse of what is sought."""
+
+    mushroom: PreparedMushroom
+    rates: Rates
+    is_reverse: bool
 
 
-def rates_at(scene: Scene, times: Floats) -> RatesAt:
-    """Interpolate a cycle's rates.
-
-    Args:
-        scene: one of those measured, or the reverse of one.
-        times: (T,) any times.
+@lru_cache(maxsize=256)
+def find_rates(mushroom: PreparedMushroom) -> MeasuredRates:
+    """Find the rates of a cycle or of its reverse.
 
     Raises:
         NotCovered: as `frozen_rates`.
     """
-    measured, rates, turned = _found(scene)
-    speed = pace(measured, -times if turned else times)
+    for is_reverse in (False, True):
+        sought = prepare(backwards(mushroom.given)) if is_reverse else mushroom
+        for measured, rates in _table().values():
+            if _is_one_cycle(measured, sought):
+                return MeasuredRates(measured, rates, is_reverse)
+    known = ", ".join(_table())
+    raise NotCovered(
+        f"no frozen rates of scene {mushroom.given.name!r} are known, without which nothing is said"
+        f" of a finite energy, only of {known} and their reverses"
+    )
+
+
+def rates_at(known: MeasuredRates, times: Floats) -> RatesAt:
+    """Interpolate a cycle's rates at times (T,), whichever."""
+    measured, rates, turned = known
+    speed = pace(measured.given, -times if turned else times)
     phases = (times / measured.period) % 1.0
     columns = [rates.diffusion, rates.lag, rates.square, rates.depletion]
     found = _between(np.column_stack(columns), 1 - phases if turned else phases, _spans(measured))
@@ -155,16 +163,13 @@ def rates_at(scene: Scene, times: Floats) -> RatesAt:
     )
 
 
-def table_error(scene: Scene) -> tuple[float, float]:
+def table_error(known: MeasuredRates) -> tuple[float, float]:
     """Return relative standard errors of what a whole cycle gathers by diffusion and by lags.
 
     Phases are weighted by the walls' speed.
-
-    Raises:
-        NotCovered: as `frozen_rates`.
     """
-    measured, rates, _ = _found(scene)
-    speed = pace(measured, PHASES * measured.period)
+    measured, rates, _ = known
+    speed = pace(measured.given, PHASES * measured.period)
     spread, lag = rates.diffusion.sum(axis=1) * speed**2, rates.lag.mean(axis=1) * speed
     errors = [rates.diffusion_error.sum(axis=1) * speed**2, rates.lag_error.mean(axis=1) * speed]
     sums = np.abs(spread).sum(), max(float(np.abs(lag).sum()), TINY)
@@ -184,14 +189,15 @@ def _between(columns: Floats, phase: Floats, spans: Floats) -> Floats:
     return found
 
 
-def _spans(scene: Mushroom) -> Floats:
+def _spans(measured: PreparedMushroom) -> Floats:
     """Return the phases, in (0, 1), at which a law stops being analytic and its walls rest."""
-    length = scene.period
-    knots = {float(t) / length % 1.0 for law in laws(scene).values() for t in breakpoints(law)[::2]}
+    length = measured.period
+    laws = measured.laws.values()
+    knots = {float(t) / length % 1.0 for law in laws for t in law.breakpoints()[::2]}
     return np.array(sorted(knots - {0.0}))
 
 
-def _is_one_cycle(measured: Mushroom, sought: Mushroom) -> bool:
+def _is_one_cycle(measured: PreparedMushroom, sought: PreparedMushroom) -> bool:
     """Tell whether two scenes move alike, however their laws are written.
 
     Values and rates at PHASES tell apart all Fourier laws of up to 63 harmonics, more than a product of two
@@ -204,9 +210,9 @@ def _is_one_cycle(measured: Mushroom, sought: Mushroom) -> bool:
     length = sought.period
     if length == 0 or not math.isclose(measured.period, length, rel_tol=SAME):
         return False  # of tables at rest no rates are kept
-    both = [*laws(measured).values(), *laws(sought).values()]
-    times = np.array([*(length * PHASES), *(float(t) for law in both for t in breakpoints(law))])
-    mine, its = table_at(fp, measured, times), table_at(fp, sought, times)
+    times = np.array([*(length * PHASES), *measured.breakpoints, *sought.breakpoints])
+    mine = table_at(fp, measured.given, times)
+    its = table_at(fp, sought.given, times)
     for name in ("r", "w", "h", "slope"):
         place, rate = getattr(mine, name), getattr(mine, f"{name}_rate")
         its_place, its_rate = getattr(its, name), getattr(its, f"{name}_rate")
@@ -218,11 +224,11 @@ def _is_one_cycle(measured: Mushroom, sought: Mushroom) -> bool:
 
 
 @lru_cache(maxsize=1)
-def _table() -> dict[str, tuple[Mushroom, Rates]]:
+def _table() -> dict[str, tuple[PreparedMushroom, Rates]]:
     data = json.loads(FILE.read_text("utf-8"))
     found = {}
     for name, entry in data["scenes"].items():
-        scene = as_mushroom(scenes.from_data(entry["scene"]))
+        scene = prepare(scenes.from_data(entry["scene"]))
         found[name] = scene, Rates(*(np.array(entry[field]) for field in Rates._fields))
     return found
 
@@ -250,19 +256,23 @@ class CycleCoefficients(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def cycle_coefficients(scene: Mushroom) -> CycleCoefficients:
+def cycle_coefficients(mushroom: PreparedMushroom) -> CycleCoefficients:
     """Follow a cycle whose frozen rates are known.
 
     Raises:
         NotCovered: they are not.
     """
-    rates_at(scene, np.zeros(1))
-    start, step = _clock_start(scene), scene.period / N_TIMES
+    known = find_rates(mushroom)
+    start = _clock_start(mushroom)
+    step = mushroom.period / N_TIMES
     times: Floats = np.asarray(start + step * (np.arange(N_TIMES) + 0.5), dtype=np.float64)
-    now, volumes, rates = table_at(fp, scene, times), volumes_at(np, scene, times), rates_at(scene, times)
+    now = table_at(fp, mushroom.given, times)
+    volumes = volumes_of(np, mushroom, times)
+    rates = rates_at(known, times)
     nu_rate = (now.w_rate * now.r - now.w * now.r_rate) / now.r**2
     flux = delta_slope(np, volumes.nu) * volumes.v_cap / volumes.v_cha
-    log_energy = chaotic_zone(scene, times).log_energy - chaotic_zone(scene, [start]).log_energy[0]
+    begun = zone_of(mushroom, np.array([start])).log_energy[0]
+    log_energy = zone_of(mushroom, times).log_energy - begun
     # v_x w and v_y (h + r) are adiabatic; the mean of |v_y| is 2 v / pi.
     height, rising = now.h + now.r, now.h_rate + now.r_rate
     shear, crossing = (
@@ -272,16 +282,17 @@ def cycle_coefficients(scene: Mushroom) -> CycleCoefficients:
     return CycleCoefficients(start, step, log_energy, hazard, nu_rate < 0, shear, crossing, rates)
 
 
-def _clock_start(scene: Mushroom) -> float:
+def _clock_start(mushroom: PreparedMushroom) -> float:
     """Return when an ensemble's cycle begins: at a bang-bang law's first knot, else at 0; or cycles later.
 
     Raises:
         NotCovered: some particles are in the island then that leave it later.
     """
-    length, opening = scene.period, float(Cycle.of(scene, 15).start)
-    start = start_time(scene)
+    length = mushroom.period
+    root, opening, _ = solve_cycle(mushroom)
+    start = start_time(mushroom.given)
     start += length * float(np.floor((opening - start) / length + ROUNDING))
-    last = max((float(branch.ends[2].max()) for branch in tree(scene).all_branches()), default=start)
+    last = max((float(branch.ends[2].max()) for branch in root.all_branches()), default=start)
     if last > start + length * (1 + ROUNDING):
         raise NotCovered("the cycle must begin with its mouth at the widest: captures before it are unknown")
     return start

@@ -17,15 +17,14 @@ from mpmath import fp
 from numpy.typing import ArrayLike
 
 from scene.geometry import table_at
-from scene.laws import breakpoints, is_constant, value
 from scene.refusal import BadInput, check_number
-from scene.tables import Scene, laws
+from scene.tables import Scene
 from theory.adiabatic import NotConverged
-from theory.branches import DIGITS, Floats, chaotic_zone
-from theory.cycle import Cycle
-from theory.finite_energy.rates import kick_rates
+from theory.branches import Floats, solve_cycle, zone_of
+from theory.finite_energy.rates import kick_rates_of
 from theory.precision import finite_array
-from theory.volumes import NotCovered, as_mushroom, in_near_units, volumes_at
+from theory.prepared import NotCovered, PreparedMushroom, prepare
+from theory.volumes import volumes_of
 
 # Panels of a cycle at first, cut at the laws' knots too; each is halved until its halves agree with it.
 N_PANELS = 128
@@ -44,8 +43,7 @@ def is_upright(scene: Scene) -> bool:
     Raises:
         NotCovered: not a mushroom.
     """
-    slope = as_mushroom(scene).slope
-    return is_constant(slope) and value(fp, slope, 0.0) == 0
+    return prepare(scene).is_upright
 
 
 def kept_by_the_cap(nu: float) -> float:
@@ -87,20 +85,25 @@ def upright_rate(scene: Scene, times: ArrayLike) -> Floats:
             rate is beyond binary64.
     """
     at = finite_array("times", times, 1)
-    if not is_upright(scene):
+    near, length, time = _prepare_upright(scene).near
+    return _in_own_units(_growth(near, np.ldexp(at, -time))[0], length - 2 * time)
+
+
+def _prepare_upright(scene: Scene) -> PreparedMushroom:
+    mushroom = prepare(scene)
+    if not mushroom.is_upright:
         raise NotCovered(TILTED)
-    scene, length, time = in_near_units(scene)
-    at = np.ldexp(at, -time)
-    return _in_own_units(_growth(scene, at)[0], length - 2 * time)
+    return mushroom
 
 
-def _growth(scene: Scene, at: Floats) -> Floats:
+def _growth(mushroom: PreparedMushroom, at: Floats) -> Floats:
     """Return `upright_rate` at times (T,), and what rounding may make of a rate of 0; shape (2, T)."""
-    now, volumes = table_at(fp, scene, at), volumes_at(np, scene, at)
+    now = table_at(fp, mushroom.given, at)
+    volumes = volumes_of(np, mushroom, at)
     w, r, h, w_rate, r_rate, h_rate = (
         np.broadcast_to(x, at.shape) for x in (now.w, now.r, now.h, now.w_rate, now.r_rate, now.h_rate)
     )
-    excess = -2 * w_rate / w - kick_rates(scene, at)
+    excess = -2 * w_rate / w - kick_rates_of(mushroom, at)
     # All that excess is a sum of, without signs: w' may be nu' r + nu r', and the zone's kicks come of all.
     opening = np.abs(w_rate) + 2 * volumes.nu * np.abs(r_rate)
     zone = 2 * np.pi * (np.pi * r * np.abs(r_rate) + 2 * opening * h + 2 * w * np.abs(h_rate))
@@ -128,20 +131,17 @@ def upright_spread(scene: Scene) -> float:
         BadInput: the mouth falls below NARROWEST, or B is beyond binary64.
         NotConverged: as `theory.predict`; or some 65,000 panels do not resolve B.
     """
-    if not is_upright(scene):
-        raise NotCovered(TILTED)
-    scene, unit_length, unit_time = in_near_units(scene)
-    cycle = Cycle.of(scene, DIGITS)
-    if cycle.period is None:
+    mushroom, unit_length, unit_time = _prepare_upright(scene).near
+    if mushroom.cycle is None:
         return 0.0
-    start = float(cycle.start)
-    begun = chaotic_zone(scene, [start]).log_energy[0]
+    start = solve_cycle(mushroom).start
+    begun = zone_of(mushroom, np.array([start])).log_energy[0]
 
     def growth(times: Floats) -> Floats:
-        slower = np.exp(-(chaotic_zone(scene, times).log_energy - begun) / 2)
-        return np.asarray(_growth(scene, times) * slower, dtype=np.float64)
+        slower = np.exp(-(zone_of(mushroom, times).log_energy - begun) / 2)
+        return np.asarray(_growth(mushroom, times) * slower, dtype=np.float64)
 
-    found = _integral(growth, _edges(scene, start, scene.period))
+    found = _integral(growth, _edges(mushroom, start))
     return float(_in_own_units(np.array(found), unit_length - unit_time))
 
 
@@ -153,10 +153,10 @@ def _in_own_units(found: Floats, exponent: int) -> Floats:
     return own
 
 
-def _edges(scene: Scene, start: float, length: float) -> Floats:
+def _edges(mushroom: PreparedMushroom, start: float) -> Floats:
     """Return times from start to the cycle's end, rising, between which every law is one piece."""
-    knots = np.array([float(t) for law in laws(scene).values() for t in breakpoints(law)])
-    inside = start + (knots - start) % length
+    length = mushroom.period
+    inside = start + (np.array(mushroom.breakpoints) - start) % length
     even = start + length * np.arange(N_PANELS + 1) / N_PANELS
     return np.unique(np.concatenate([even, inside[inside < even[-1]]]))
 

@@ -33,9 +33,7 @@ from scene import (
     Stem,
     Undecided,
 )
-from scene.geometry import half_width, table_at
-from scene.laws import bounds, is_constant
-from scene.tables import laws
+from scene.geometry import table_at
 
 FINE, COARSE = 2.0**-36, SLACK * BOUND  # of sizes
 FLIGHT = 2.0**-48  # of sizes: a straight flight, of a stepper that is fine
@@ -100,12 +98,12 @@ def _first_flaw(
     margin = place + aside * pace / size
     # A wall that turns soon has another speed at a time that is rounded.
     turning = sum(
-        bounds(law).curvature * (size if name in ("nu", "slope") else 1.0)
-        for name, law in laws(scene).items()
+        law.bounds().curvature * (size if name in ("nu", "slope") else 1.0)
+        for name, law in scene.laws.items()
     )
     rounding = margin + aside * turning / pace
     off_before = np.abs(kept) / np.append(now.r if start.wall == "arc" else 1.0, steep[:-1]) / size
-    is_at_rest = all(is_constant(law) for law in laws(scene).values())
+    is_at_rest = scene.cycle is None
     gained = is_at_rest * np.abs(np.hypot(vx, vy) / hypot(start.vx, start.vy) - 1.0)
     spin = np.abs(np.abs(x * vy - y * vx) - abs(start.x * start.vy - start.y * start.vx))
     flaws = {
@@ -180,7 +178,7 @@ def _beyond(scene: Scene, before: Any, dt: Any, walls: Any, end: tuple[Any, Any]
         on_base = (walls == "base")[:, None]
         s = np.where(vy0 != 0, -y0 / np.where(vy0 != 0, vy0, 1.0), -1.0)
         crosses = (s > 0) & (s < dt[:, None]) & (y0 != 0) & ~on_base
-        w = half_width(fp, scene, t0 + np.where(crosses, s, dt[:, None]))
+        w = scene.width.value(fp, t0 + np.where(crosses, s, dt[:, None]))
         out = np.maximum(out, np.where(crosses, np.abs(x0 + vx0 * s) - w, -1.0))
         out = np.maximum(out, np.where(on_base, w - np.abs(x[:, -1:]), -1.0))
     return (out / table.size).max(axis=1)
@@ -201,7 +199,7 @@ def first_capture(
     for hit in hits:
         assert isinstance(hit, Collision)
         vx, vy = path.state.vx, path.state.vy
-        reach = float(half_width(fp, scene, hit.t)) * hypot(vx, vy)
+        reach = float(scene.width.value(fp, hit.t)) * hypot(vx, vy)
         spin = abs(hit.x * vy - hit.y * vx)
         if hit.wall == "arc" and not path.stays and abs(spin - reach) <= ON_EDGE * reach:
             return UNCLEAR

@@ -181,9 +181,11 @@ class Implementation:
         Raises:
             CheckFailure: declined.
         """
+        if n <= SHORT:
+            return
         expected = n * self.pace.get(what, 0.0)
         limit = PROMPT * self.session.limits.timeout
-        if n > SHORT and expected > limit:
+        if expected > limit:
             why = f"{n:,} {what} would take some {expected:.2g} s, more than {limit:g} s: not asked"
             raise CheckFailure("declined", why)
 

@@ -42,8 +42,12 @@ def test_reference_and_verifier_never_differ_on_the_whole_grid(tally):
 
 def test_every_scene_has_every_kind_of_answer():
     for name in SCENES:
-        kinds = {line["expect"][0]["outcome"] for line in islice(lines(name, 100), 100) if line}
-        assert {"collision", "horizon", "undefined", "rejected"} <= kinds, name
+        lacking = {"collision", "horizon", "undefined", "rejected"}
+        for line in islice(lines(name, 100), 100):
+            lacking -= {line["expect"][0]["outcome"]} if line else set()
+            if not lacking:
+                break
+        assert lacking == set(), name
 
 
 QUARTERS = {

@@ -351,9 +351,10 @@ class Law(NamedTuple):
     Attributes:
         mean: its value without waves; not used where there are legs.
         waves: for k = 1, 2, ... the factors of cos and sin of k times the phase.
-        legs: of a bang-bang law, two from each knot to the next, in the order of time.
+        legs: of a bang-bang law, two from each knot to the next, in the order of time; empty where
+            nothing moves.
         ends: a lower and an upper bound of its values, at all times.
-        is_tight: whether it attains both bounds.
+        is_tight: whether it attains both bounds: then a bound <= 0 breaks "> 0" (`require_valid`).
     """
 
     mean: Fraction
@@ -656,8 +657,8 @@ class Flight:
         """Tell whether f > 0 is proved on a stretch but at its left end, where f >= 0 is known.
 
         Its enclosure alone does not show f > 0: `first_root` asks that before. If f > 0 is proved
-        here, it holds at the right end, where the next stretch starts. f and f' are continuous, for
-        laws come to rest at their knots. f'' may jump at finitely many times. One of these suffices
+        here, it holds at the right end, where the next stretch starts. f and f' are continuous, as
+        laws and their slopes are at knots. f'' may jump at finitely many times. One of these suffices
         (the names are those of docs/proof.md, section 3):
 
         - rising: f' > 0;

@@ -152,7 +152,10 @@ class Arithmetic:
         return self.point(raw.from_parts(value.numerator, -shift))
 
     def between(self, low: Fraction, high: Fraction) -> Interval:
-        """Return the interval between two such rationals, exactly."""
+        """Return the interval between two rationals whose denominators are powers of two, exactly.
+
+        Denominators are not checked. Of any other rational this would make another number.
+        """
         return self.hull(self.dyadic(low), self.dyadic(high))
 
     def point(self, number: raw.Raw) -> Interval:

@@ -191,13 +191,15 @@ def json_schema() -> dict[str, Any]:
 def limit_definitions(definitions: dict[str, Any]) -> None:
     """Put what a schema can say of `scene.protocol.rules` into its definitions."""
     fourier = definitions["Fourier"]
-    knots = definitions["BangBang"]["properties"]["knots"]
     for field in ("omega", "period"):
         fourier["properties"][field] = {"type": "number", "exclusiveMinimum": 0}
     fourier["oneOf"] = [{"required": ["omega"]}, {"required": ["period"]}]
     for field in ("cos", "sin"):
         fourier["properties"][field]["maxItems"] = MAX_HARMONICS
-    knots |= {"minItems": 2, "maxItems": MAX_KNOTS}
+    for kind in WRITTEN:
+        properties = definitions[kind.__name__]["properties"]
+        if "knots" in properties:
+            properties["knots"] |= {"minItems": 2, "maxItems": MAX_KNOTS}
     mushroom = definitions["Mushroom"]
     for field in ("w", "nu"):
         forms = mushroom["properties"][field]["anyOf"]

@@ -151,9 +151,9 @@ def _check_by_intervals(laws: Laws, condition: Condition, legs: Sequence[Law]) -
     verdict = sign_on_legs(condition.terms, condition.is_strict, leg_intervals(legs))
     if verdict.holds is None:
         raise InvalidScene(
-            f"{condition.text} cannot be shown near t = {float(verdict.time):.6g}: where Fourier"
-            " and bang-bang laws meet in one condition its sides must keep apart: here they touch,"
-            " or nearly"
+            f"{condition.text} cannot be shown near t = {float(verdict.time):.6g}: where a law"
+            " of waves and one with knots meet in one condition its sides must keep apart:"
+            " here they touch, or nearly"
         )
     if not verdict.holds:
         raise InvalidScene(_message(laws, condition, verdict.time))
@@ -172,9 +172,9 @@ def sign_on_legs(
     """Decide whether the sum of sign * product(laws) is > 0 (strict) or >= 0 at all times.
 
     Args:
-        terms: (sign, laws); bang-bang laws and Fourier laws that give their period.
+        terms: (sign, laws); laws with knots, and Fourier laws that give their period.
         is_strict: whether 0 is not enough.
-        legs: intervals that cover one period, each within one piece of every bang-bang law.
+        legs: intervals that cover one period, each within one piece of every law.
 
     Returns:
         The verdict. Its time is one at which the condition fails, or near which it is open.

@@ -1,16 +1,26 @@
 """A law is asked through its interface: its kind is known in few places.
 
-A new kind of law changes the files in PLACES and no other (docs/new-law.md). A table gives its mouth as
+Of the packages, only the files in PLACES ask for a kind (docs/new-law.md). A table gives its mouth as
 `scene.width`, so nobody needs to ask whether `w` or `nu` was given.
 """
 
 import ast
 from collections.abc import Iterator
+from fractions import Fraction
+from typing import get_args
 
 import pytest
 from test_house_files import PACKAGES, texts
 
-KINDS = {"Constant", "Fourier", "BangBang", "ConstantPiece", "PolynomialPiece", "TrigonometricPiece"}
+import scene
+from conformance.bench.baselines import _row
+from fast.kernel.laws import row_of
+from reference.arithmetic import Arithmetic
+from reference.timeline import law_in_time
+from scene.laws import WRITTEN
+from scene.pieces import Period, Piece
+
+KINDS = {kind.__name__ for kind in (scene.Constant, *WRITTEN)} | {piece.__name__ for piece in get_args(Piece)}
 # What defines, compiles or encloses laws. The verifier has kinds of its own.
 PLACES = {
     "scene/laws.py": "defines them",
@@ -65,6 +75,18 @@ def test_the_kind_of_a_law_is_asked_for_in_few_places():
     assert asked <= set(PLACES)
     # A place that asks no longer leaves the table; a class of laws need not ask for its own kind.
     assert set(PLACES) - {"scene/laws.py"} <= asked
+
+
+class Unknown(scene.Law, frozen=True):
+    """A kind of law that moves, and that no file in PLACES knows."""
+
+    cycle = Period(1.0, None)
+
+
+@pytest.mark.parametrize("ask", [lambda law: law_in_time(Arithmetic(30), law, Fraction(0)), row_of, _row])
+def test_a_kind_that_is_not_known_is_refused(ask):
+    with pytest.raises(TypeError, match=r"Unknown: .* this kind of law"):
+        ask(Unknown())
 
 
 @pytest.mark.parametrize(

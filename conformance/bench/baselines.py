@@ -189,8 +189,10 @@ def _row(law: Law) -> FloatArray:
     elif isinstance(law, Fourier):
         row[0], row[2], row[3] = FOURIER, law.mean, float(law.frequency(fp))
         pairs = list(zip_longest(law.cos, law.sin, fillvalue=0.0))
-    else:
+    elif law.is_constant:
         row[0], row[2] = CONSTANT, law.level
+    else:
+        raise TypeError(f"{type(law).__name__}: the engines in C do not know this kind of law")
     row[1] = len(pairs)
     row[PAIRS : PAIRS + 2 * len(pairs)] = np.ravel(pairs)
     return row

@@ -11,8 +11,9 @@ knots are written in. All Fourier laws of a scene share their omega, so the sine
 are found once for all of them, at the event (row PHASE) and for the turn since then, at one s (row TURN).
 
 `row_of` lays out a law as the numbers that all this reads. What a path in pairs of floats asks of a law is
-at the end (`fine_law`, `fine_increment`). So a kind of law is known in this file alone; lanes take those
-kinds that are IN_LANES, and the scalar step takes the others.
+at the end (`fine_law`, `fine_increment`). So the scalar step knows a kind of law by this file alone, and by
+its number and columns in fast.kernel.records. Lanes take those kinds that are IN_LANES (fast.pieces and
+fast.kernel.lane_laws read their numbers), and the scalar step takes the others.
 
 A size is used as if its value were right to a unit or two in its last place. Its terms are known to
 2^-62 of themselves, which is enough where they leave more than a small part of the mean; where they cancel
@@ -392,10 +393,10 @@ def width(scene, anchors, s):
 @kernel
 def rest(laws, anchors, row, s):
     """Return for how long after the time s a law stands still; 0 when it moves, or is not known to rest."""
-    if laws[row, KIND] == FOURIER:
-        return 0.0
-    if laws[row, KIND] != BANG_BANG:
+    if laws[row, KIND] == CONSTANT:
         return np.inf
+    if laws[row, KIND] != BANG_BANG:
+        return 0.0
     j, left, room, _, _, _ = leg_after(laws, anchors, row, s)
     if bend_of_half_leg(laws, row, j) != 0.0:
         return 0.0

@@ -258,5 +258,5 @@ def draw(
 
 
 def at_knots(law: Law) -> list[float]:
-    """Return the values of a bang-bang law at its knots, in order of time."""
+    """Return the values of a bang-bang law at its knots, every other breakpoint."""
     return [float(law.value(fp, float(time))) for time in law.breakpoints()[::2]]

@@ -145,7 +145,7 @@ RULES = (
         in_schema=True,
     ),
     ProtocolRule(
-        "known-kind", "law", "`kind` is fourier or bang-bang", Duty.REJECT, in_schema=True
+        "known-kind", "law", f"`kind` is {' or '.join(KINDS)}", Duty.REJECT, in_schema=True
     ),
     ProtocolRule(
         "one-rate",

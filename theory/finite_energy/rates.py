@@ -190,7 +190,7 @@ def _between(columns: Floats, phase: Floats, spans: Floats) -> Floats:
 
 
 def _spans(measured: PreparedMushroom) -> Floats:
-    """Return the phases, in (0, 1), at which a law stops being analytic and its walls rest."""
+    """Return the phases, in (0, 1), of knots; those of the scenes measured are bang-bang laws', at rest."""
     length = measured.period
     laws = measured.laws.values()
     knots = {float(t) / length % 1.0 for law in laws for t in law.breakpoints()[::2]}

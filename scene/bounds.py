@@ -65,9 +65,8 @@ def least_of_waves(mean: float, harmonics: Harmonics) -> float:
     bend = sum(k * k * (abs(c) + abs(s)) for k, c, s in waves)
     for n in (2**8, 2**11, 2**14, 2**17):
         phases = np.arange(n) * (2.0 * np.pi / n)
-        least = float(
-            (1.0 + sum(c * np.cos(k * phases) + s * np.sin(k * phases) for k, c, s in waves)).min()
-        )
+        swings = sum(c * np.cos(k * phases) + s * np.sin(k * phases) for k, c, s in waves)
+        least = float(np.min(1.0 + swings))
         found = least - bend * (2.0 * np.pi / n) ** 2 / 8.0 - 2.0**-40 * size
         if found > 0.5 * least:
             return found * mean

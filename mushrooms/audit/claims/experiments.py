@@ -191,7 +191,7 @@ def _modes(sample: Sample) -> Iterator[Check]:
         found = float(middle[side][np.argmax(counts[side])])
         yield stated(
             f"{sample.run.name}: two modes, {name}",
-            likely.min() <= found <= likely.max(),
+            bool(likely.min() <= found <= likely.max()),
             f"mode at {found:+.3f}",
             f"{likely.min():+.3f} to {likely.max():+.3f}, by theory with {sample.n} particles",
         )

@@ -460,7 +460,7 @@ def heating(evidence: ClaimEvidence) -> list[Check]:
         ),
         stated(
             "energy is constant in the cap",
-            still.sum() > 0 and largest < 1e-9,
+            bool(still.sum() > 0 and largest < 1e-9),
             f"{largest:.1e}",
             "0",
             form="corrected",

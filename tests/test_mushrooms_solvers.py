@@ -1,5 +1,7 @@
 """What the benchmark says of a solver's time: nanoseconds a collision, by each way of calling it."""
 
+import io
+import json
 from types import SimpleNamespace
 from typing import Any
 
@@ -7,7 +9,7 @@ import numpy as np
 import pytest
 
 import fast
-from conformance.bench import workloads
+from conformance.bench import baselines, workloads
 from mushrooms import bench
 from scene import Collision
 
@@ -52,3 +54,20 @@ def test_a_path_is_timed_by_its_collisions_in_all_laps(asked, monkeypatch):
     ns, answers, total = bench._trajectory(asked, N_TIMES)
     assert (ns, total) == (6000 / (N_TIMES * 40), 6000)
     assert all(isinstance(answer, Collision) for answer in answers)
+
+
+def test_a_baseline_speaks_the_protocol(monkeypatch):
+    """An adaptive integrator finds where a level path meets the arc of radius 1."""
+    state = {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 1.0, "vy": 0.0, "wall": None}
+    step = {"cmd": "step", "seq": 1, "scene": {"table": "cap", "r": 1.0}, "state": state, "t_end": 9.0}
+    lines = [{"cmd": "start", "protocol": 1}, step, {"cmd": "stop"}]
+    sent = io.TextIOWrapper(io.BytesIO("".join(json.dumps(line) + "\n" for line in lines).encode()))
+    heard = io.TextIOWrapper(io.BytesIO())
+    monkeypatch.setattr(baselines.sys, "stdin", sent)
+    monkeypatch.setattr(baselines.sys, "stdout", heard)
+    name = next(name for name in baselines.NAMES if name.startswith("solve-ivp"))
+    baselines.main([name])
+    start, hit = map(json.loads, heard.buffer.getvalue().splitlines())
+    assert start["name"] == name
+    assert (hit["outcome"], hit["wall"]) == ("collision", "arc")
+    assert abs(hit["x"] - 0.75**0.5) < 1e-2

@@ -541,8 +541,8 @@ def wall_gap(particle, scene, anchors):
     return f, (h if particle.wall == FLOOR else max(w, abs(particle.x)))
 
 
-@kernel
-def step_if_known(particle, limit, origin, scene, anchors):
+@kept(ON_WALL, **HOW)
+def scalar_step(particle, limit, origin, scene, anchors):
     """Take a scalar step of a particle, known as well as `origin` says.
 
     For OFF_WALL the time of flight is the share of the wall's size by which the particle is off it.
@@ -557,11 +557,3 @@ def step_if_known(particle, limit, origin, scene, anchors):
     if crossed != NO_WALL:
         return BEYOND_ARC + crossed, 0.0, particle
     return step(particle, limit, scene, anchors)
-
-
-# numba compiles a function once for callers that Python calls and once more for kernels. So what Python
-# calls does nothing but call one kernel.
-@kept(ON_WALL, **HOW)
-def scalar_step(particle, limit, origin, scene, anchors):
-    """Take a scalar step: see `step_if_known`."""
-    return step_if_known(particle, limit, origin, scene, anchors)

@@ -168,6 +168,12 @@ def single_by_python(step_at: Any, numbers: FloatArray, *question: Any) -> tuple
     return int(found[0]), *map(float, found[1:])
 
 
+@cache
+def compiled() -> tuple[Any, Any]:
+    """Return what answers a question, and the address of the scalar step."""
+    return single_at_once(), careful_at()
+
+
 allowance = Allowance()
 
 
@@ -175,7 +181,7 @@ def asking() -> tuple[Any, Any]:
     """Return what answers a question, and the scalar step that it is to be given."""
     if allowance.left and allowance.take(1, single, scalar_step):
         return single_by_python, as_python(scalar_step)
-    return single_at_once(), careful_at()
+    return compiled()
 
 
 def share_off_wall(scene: Compiled, particle: Particle) -> float:

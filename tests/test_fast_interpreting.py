@@ -94,3 +94,11 @@ def test_what_is_compiled_before_is_taken(monkeypatch):
     monkeypatch.setattr(interpreting, "is_at_hand", lambda _: True)
     assert not allowance.take(1, single.single)
     assert allowance.left == 0
+
+
+def test_the_disk_is_looked_at_before_the_first_step_only(monkeypatch):
+    looked = []
+    monkeypatch.setattr(interpreting, "is_at_hand", looked.append)
+    allowance = Allowance()
+    assert all(allowance.take(1, single.single) for _ in range(5))
+    assert looked == [single.single]

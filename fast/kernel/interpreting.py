@@ -67,10 +67,11 @@ class Allowance:
 
         Args:
             n_steps: to be run at most.
-            entries: the kept functions that would run them: if all are kept on disk, or in this process,
-                Python does not.
+            entries: the kept functions that would run them. If all are kept, on disk or in this process,
+                Python does not. That is looked up before the first step only: it reads a folder.
         """
-        if n_steps > self.left or all(is_at_hand(entry) for entry in entries):
+        is_first = self.left == MOST_STEPS
+        if n_steps > self.left or (is_first and all(is_at_hand(entry) for entry in entries)):
             self.left = 0
             return False
         self.left -= n_steps
